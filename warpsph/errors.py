@@ -1,0 +1,55 @@
+"""What can go wrong, said in one line that names the field, its value and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class WarpSPHError(Exception):
+    """Base class of every error that warpsph raises on purpose."""
+
+
+class SceneError(WarpSPHError, ValueError):
+    """A scene, a parameter or an option is not allowed.
+
+    Attributes:
+        field: name of the offending field, as the user wrote it.
+        value: its value.
+        allowed: what would be allowed instead.
+    """
+
+    def __init__(self, field: str, value: object, allowed: str):
+        self.field, self.value, self.allowed = field, value, allowed
+        super().__init__(f"{field} = {_short(value)} is not allowed: {allowed}")
+
+
+class NonFiniteError(WarpSPHError, ArithmeticError):
+    """A field became NaN or infinite during a run.
+
+    Attributes:
+        step: number of the step that produced it.
+        time: simulated time at the end of that step [s].
+        node: index of one material node where it was seen.
+    """
+
+    def __init__(self, step: int, time: float, node: int, position: Iterable[float]):
+        self.step, self.time, self.node = step, time, node
+        at = ", ".join(f"{x:.6g}" for x in position)
+        super().__init__(
+            f"velocity or stress became non-finite in step {step} (t = {time:.6g} s) at node {node}, "
+            f"initially at ({at}) m: the state can not be advanced; try a smaller courant number"
+        )
+
+
+def _short(value: object, limit: int = 120) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+def one_of(options: Iterable[object], given: object = None) -> str:
+    """The sentence "one of a, b, c", with the nearest right name where `given` is close to one."""
+    names = [str(option) for option in options]
+    near = difflib.get_close_matches(str(given), names, n=1) if given is not None else []
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    return f"it must be one of {', '.join(names)}{hint}"

@@ -1,0 +1,1 @@
+"""The ground floor: precision, smoothing functions, kinematics, materials. Pure functions only."""

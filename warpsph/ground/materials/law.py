@@ -1,0 +1,28 @@
+"""What the solver needs to know of a material."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import warp as wp
+
+
+@dataclass(frozen=True)
+class Law:
+    """A material law as a parameter struct and pure functions.
+
+    `Parameters` always has the fields young, lame and shear [Pa]. The functions below are None for an elastic
+    law, which has no source: then nothing of them is compiled, allocated or run.
+
+    Attributes:
+        Parameters: Warp struct type.
+        fill: material → instance of `Parameters`.
+        history: name and unit of each internal variable a node keeps.
+        flow: (σ, history, Parameters) → (dσ/dt, d history/dt) by inelastic flow alone.
+        flow_stiffness: (σ, history, Parameters) → the rate λ [1/s] at which that flow decays, for the step limit.
+    """
+
+    Parameters: type
+    fill: Callable[[object], object]
+    history: tuple[tuple[str, str], ...] = ()
+    flow: wp.Function | None = None
+    flow_stiffness: wp.Function | None = None

@@ -1,0 +1,1 @@
+"""The two node sets and the pair lists between them."""

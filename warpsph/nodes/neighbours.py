@@ -1,0 +1,157 @@
+"""Pair lists of one node set around the other, filled from `wp.HashGrid` queries and kept with a skin.
+
+A list holds for each target point the source points within its search radius, its support plus a skin. While
+no point has used up half the skin the list contains every neighbour, and the sweep drops the few that lie
+outside the support. Building costs about six sweeps (METHOD: 48 ms against 7.4 ms at 10⁵ points), so a list
+pays off after a few steps; nodes move about 10⁻³ Δx a step.
+"""
+
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from ..ground.precision import Precision
+from ..scene.dimension import Continuum
+from .node_sets import node_types
+
+SKIN = 0.25
+"""Skin in lattice spacings. With the default support of 1.8 spacings the radius 2.05 still ends before the next
+shell of an undeformed lattice (2.12), so the skin costs no extra pair there."""
+
+
+@wp.struct
+class PairList:
+    """Neighbours of target t: index[start[t]] … index[start[t + 1] − 1]."""
+
+    start: wp.array(dtype=wp.int32)
+    index: wp.array(dtype=wp.int32)
+
+
+class Neighbours:
+    """The pair list of the sources around each target.
+
+    Args:
+        continuum, precision: what the points are.
+        targets, sources: node structs (material or auxiliary).
+        support: radius of the support in smoothing lengths.
+        spacing: lattice spacing [m].
+        skin: extra search radius [m].
+    """
+
+    def __init__(self, continuum, precision, targets, sources, support, spacing, skin):
+        self.pairs = PairList()
+        self._targets, self._sources = targets, sources
+        self._support, self._skin, self._spacing = support, skin, spacing
+        self._kernels = _list_kernels(continuum, precision)
+        device = sources.point.device
+        self._origin = np.array(sources.point.numpy()["x"].mean(axis=0), dtype=float)
+        self._grid_points = wp.zeros(sources.point.shape[0], dtype=wp.vec3, device=device)
+        self._grid = wp.HashGrid(*_grid_size(sources, spacing, continuum.dim), device=device)
+        self._counts = wp.zeros(targets.point.shape[0] + 1, dtype=wp.int32, device=device)
+        self.pairs.start = wp.zeros(targets.point.shape[0] + 1, dtype=wp.int32, device=device)
+
+    def build(self) -> None:
+        """Make the list anew for the present positions and smoothing lengths."""
+        kernels, device = self._kernels, self._grid_points.device
+        n = self._targets.point.shape[0]
+        origin = kernels.vector(*self._origin.tolist())
+        wp.launch(
+            kernels.copy_points,
+            self._sources.point.shape[0],
+            inputs=[self._sources.point, origin],
+            outputs=[self._grid_points],
+            device=device,
+        )
+        # The grid works in float32: widen its queries by what rounding can do, the sweep tests exactly.
+        extent = float(np.abs(self._grid_points.numpy()).max())
+        margin = self._skin + 1e-4 * self._spacing + 1e-6 * extent
+        radius = self._support * float(self._targets.smoothing_length.numpy().max()) + margin
+        self._grid.build(self._grid_points, radius)
+        query = [self._grid.id, self._grid_points, self._targets.point, self._targets.smoothing_length]
+        query += [origin, self._support, margin]
+        wp.launch(kernels.count, n, inputs=query, outputs=[self._counts], device=device)
+        wp.utils.array_scan(self._counts, self.pairs.start, inclusive=False)
+        total = int(self.pairs.start[n : n + 1].numpy()[0])
+        if self.pairs.index is None or self.pairs.index.shape[0] < total:
+            self.pairs.index = wp.empty(int(1.1 * total) + 1, dtype=wp.int32, device=device)
+        wp.launch(kernels.fill, n, inputs=[*query, self.pairs], device=device)
+
+    def mean_count(self) -> float:
+        """Mean number of listed neighbours a target."""
+        start = self.pairs.start.numpy()
+        return float(start[-1]) / (len(start) - 1)
+
+
+def _grid_size(sources, spacing: float, dim: int) -> tuple[int, int, int]:
+    """Cells of the hash grid along each axis: about one a search radius, flat where there is no axis."""
+    x = sources.point.numpy()["x"]
+    cells = np.clip(np.ceil(np.ptp(x, axis=0) / (2.0 * spacing)), 1, 512).astype(int).tolist()
+    return tuple(cells + [1] * (3 - dim))
+
+
+class _Kernels:
+    def __init__(self, vector, copy_points, count, fill):
+        self.vector, self.copy_points, self.count, self.fill = vector, copy_points, count, fill
+
+
+@cache
+def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
+    types = node_types(continuum, precision)
+    Point, vector, real = types.Point, types.vector, precision.real
+    dim = continuum.dim
+
+    @wp.func
+    def grid_point(x: vector, origin: vector):
+        r = x - origin
+        p = wp.vec3()
+        for k in range(wp.static(dim)):
+            p[k] = wp.float32(r[k])
+        return p
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def copy_points(points: wp.array(dtype=Point), origin: vector, out: wp.array(dtype=wp.vec3)):
+        i = wp.tid()
+        out[i] = grid_point(points[i].x, origin)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def count(
+        grid: wp.uint64,
+        grid_points: wp.array(dtype=wp.vec3),
+        targets: wp.array(dtype=Point),
+        smoothing_length: wp.array(dtype=real),
+        origin: vector,
+        support: float,
+        margin: float,
+        counts: wp.array(dtype=wp.int32),
+    ):
+        i = wp.tid()
+        p = grid_point(targets[i].x, origin)
+        radius = support * wp.float32(smoothing_length[i]) + margin
+        found = int(0)
+        for j in wp.hash_grid_query(grid, p, radius):
+            if wp.length_sq(grid_points[j] - p) < radius * radius:
+                found += 1
+        counts[i] = found
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def fill(
+        grid: wp.uint64,
+        grid_points: wp.array(dtype=wp.vec3),
+        targets: wp.array(dtype=Point),
+        smoothing_length: wp.array(dtype=real),
+        origin: vector,
+        support: float,
+        margin: float,
+        pairs: PairList,
+    ):
+        i = wp.tid()
+        p = grid_point(targets[i].x, origin)
+        radius = support * wp.float32(smoothing_length[i]) + margin
+        k = pairs.start[i]
+        for j in wp.hash_grid_query(grid, p, radius):
+            if wp.length_sq(grid_points[j] - p) < radius * radius:
+                pairs.index[k] = j
+                k += 1
+
+    return _Kernels(vector, copy_points, count, fill)

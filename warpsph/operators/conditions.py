@@ -1,0 +1,136 @@
+"""Boundary conditions on the material nodes, as resolved by `warpsph.scene.boundary`.
+
+Moving free surfaces, detected as the body deforms, will be one more object with the method `apply` beside
+`Conditions`; edges given by selection are all in here.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from ..ground.precision import Precision
+from ..ground.unknowns import unknowns
+from ..nodes.node_sets import NodeTypes, node_types
+from ..scene.boundary import BoundaryTable
+from ..scene.dimension import Continuum
+
+
+@dataclass(frozen=True)
+class ConditionTypes:
+    """Warp side of the conditions.
+
+    Attributes:
+        Table: struct of arrays: `row` (n,), the row of each node or −1; P, Π, amplitudes and functions a row,
+            and `drive`, the present value of each function of time.
+        apply: (node, φ, Table) → φ after v ← P v + Σ a_k f_k, σ ← Π σ.
+    """
+
+    Table: type
+    apply: wp.Function
+
+
+@cache
+def condition_types(continuum: Continuum, precision: Precision) -> ConditionTypes:
+    """The table and the function of one continuum in one precision."""
+    types, phi = node_types(continuum, precision), unknowns(continuum, precision)
+    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
+    vector, real = types.vector, precision.real
+    stress_matrix = precision.mat(continuum.stress_size, continuum.stress_size)
+
+    @wp.struct
+    class Table:
+        row: wp.array(dtype=wp.int32)
+        velocity_projector: wp.array(dtype=types.tensor)
+        stress_projector: wp.array(dtype=stress_matrix)
+        amplitude: wp.array2d(dtype=vector)
+        function: wp.array2d(dtype=wp.int32)
+        drive: wp.array(dtype=real)
+
+    @wp.func
+    def apply(i: int, values: phi.phi, table: Table):
+        row = table.row[i]
+        if row < 0:
+            return values
+        v = table.velocity_projector[row] * velocity_of(values)
+        for k in range(table.amplitude.shape[1]):
+            v += table.drive[table.function[row, k]] * table.amplitude[row, k]
+        return join(v, table.stress_projector[row] * stress_of(values))
+
+    return ConditionTypes(Table, apply)
+
+
+class Conditions:
+    """The conditions of a scene on one device.
+
+    Args:
+        boundary: the resolved conditions.
+        n: number of material nodes.
+    """
+
+    def __init__(
+        self, boundary: BoundaryTable, n: int, continuum: Continuum, precision: Precision, device: wp.Device
+    ):
+        types = node_types(continuum, precision)
+        self.table = condition_types(continuum, precision).Table()
+        self._functions = boundary.functions
+        self._kernel = _apply_kernel(continuum, precision)
+        row = np.full(n, -1, dtype=np.int32)
+        row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
+        self._fill(row, boundary, types, continuum, precision, device)
+
+    def _fill(self, row, boundary, types: NodeTypes, continuum, precision, device) -> None:
+        def array(values, dtype, **options):
+            return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, **options)
+
+        size, table = continuum.stress_size, self.table
+        table.row = array(row, wp.int32)
+        table.velocity_projector = array(boundary.velocity_projector, types.tensor)
+        table.stress_projector = array(boundary.stress_projector, precision.mat(size, size))
+        rows, terms = boundary.function.shape
+        table.amplitude = wp.zeros((rows, terms), dtype=types.vector, device=device)
+        table.function = wp.zeros((rows, terms), dtype=wp.int32, device=device)
+        if terms:
+            table.amplitude.assign(boundary.amplitude)
+            table.function.assign(boundary.function)
+        table.drive = wp.zeros(max(1, len(self._functions)), dtype=precision.real, device=device)
+
+    def set_time(self, t: float) -> None:
+        """Evaluate the prescribed velocities at time t [s]."""
+        if self._functions:
+            self.table.drive.assign([f(t) if callable(f) else f for f in self._functions])
+
+    def apply(self, nodes, t: float, step: int, health: wp.array) -> None:
+        """Step 13: impose the conditions at time t on the nodes, in place, and note the first non-finite node.
+
+        Args:
+            nodes: material nodes.
+            t: time [s].
+            step: number of the step, for the report.
+            health: (node, step) of the first non-finite value, −1 while there is none.
+        """
+        self.set_time(t)
+        wp.launch(
+            self._kernel,
+            nodes.point.shape[0],
+            inputs=[self.table, step, nodes, health],
+            device=nodes.point.device,
+        )
+
+
+@cache
+def _apply_kernel(continuum: Continuum, precision: Precision):
+    types, conditions = node_types(continuum, precision), condition_types(continuum, precision)
+    Table, apply, MaterialNodes = conditions.Table, conditions.apply, types.MaterialNodes
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def apply_conditions(table: Table, step: int, nodes: MaterialNodes, health: wp.array(dtype=wp.int32)):
+        i = wp.tid()
+        phi = apply(i, nodes.point[i].phi, table)
+        nodes.point[i].phi = phi
+        if not wp.isfinite(wp.dot(phi, phi)) and health[0] < 0:
+            health[0] = i
+            health[1] = step
+
+    return apply_conditions

@@ -1,0 +1,148 @@
+"""Step 14: nodes move, auxiliary nodes are re-centred, density and smoothing length follow."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import warp as wp
+
+from ..ground.precision import Precision
+from ..nodes.node_sets import node_types
+from ..scene.dimension import Continuum
+
+
+@dataclass(frozen=True)
+class NoMotion:
+    """Small displacements: the initial configuration is kept."""
+
+    def move(self, nodes, auxiliary, dt: float) -> None:
+        """Nothing."""
+
+    def lists_outdated(self) -> bool:
+        """Never."""
+        return False
+
+    def mark(self, nodes) -> None:
+        """Nothing."""
+
+
+class Motion:
+    """Moves the nodes with v^{n+1/2}, and tells when the pair lists have used up their skin.
+
+    Args:
+        n: number of material nodes.
+        support: radius of the support in smoothing lengths.
+        skin: skin of the pair lists [m].
+        reference_density: ρ₀ [kg/mᵈ].
+    """
+
+    def __init__(self, n, support, skin, reference_density, continuum, precision, device):
+        types = node_types(continuum, precision)
+        self._support, self._skin, self._reference_density = support, skin, reference_density
+        self._initial_smoothing_length: wp.array | None = None
+        self._listed = wp.zeros(n, dtype=types.vector, device=device)
+        self._listed_h = wp.zeros(n, dtype=precision.real, device=device)
+        self._outdated = wp.zeros(1, dtype=wp.int32, device=device)
+        self._kernel = _move_kernel(continuum, precision)
+        self._centre = centre_kernel(continuum, precision)
+
+    def mark(self, nodes) -> None:
+        """Remember where the nodes are now: the pair lists were just built for this."""
+        if self._initial_smoothing_length is None:
+            self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
+        wp.copy(self._listed, nodes.displacement)
+        wp.copy(self._listed_h, nodes.smoothing_length)
+        self._outdated.zero_()
+
+    def lists_outdated(self) -> bool:
+        """Whether some node has used up its half of the skin since `mark`."""
+        return bool(self._outdated.numpy()[0])
+
+    def move(self, nodes, auxiliary, dt: float) -> None:
+        """x ← x + Δt v^{n+1/2}, ρ ← ρ/det(1 + Δt L), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""
+        device = nodes.point.device
+        wp.launch(
+            self._kernel,
+            nodes.point.shape[0],
+            inputs=[
+                self._reference_density,
+                self._initial_smoothing_length,
+                self._support,
+                0.5 * self._skin,
+                dt,
+                self._listed,
+                self._listed_h,
+                nodes,
+                self._outdated,
+            ],
+            device=device,
+        )
+        wp.launch(self._centre, auxiliary.point.shape[0], inputs=[nodes, auxiliary], device=device)
+
+
+@cache
+def _move_kernel(continuum: Continuum, precision: Precision):
+    types = node_types(continuum, precision)
+    real, vector, MaterialNodes = precision.real, types.vector, types.MaterialNodes
+    dim = continuum.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def move(
+        reference_density: real,
+        initial_smoothing_length: wp.array(dtype=real),
+        support: real,
+        half_skin: real,
+        dt: real,
+        listed: wp.array(dtype=vector),
+        listed_h: wp.array(dtype=real),
+        nodes: MaterialNodes,
+        outdated: wp.array(dtype=wp.int32),
+    ):
+        i = wp.tid()
+        u = nodes.displacement[i] + dt * nodes.half_velocity[i]
+        # The exact change of volume of the map x → x + Δt v over the step; to first order −ρ tr(d) Δt.
+        stretch = dt * nodes.velocity_gradient[i]
+        for k in range(wp.static(dim)):
+            stretch[k, k] += real(1.0)
+        volume_ratio = stretch[0, 0]
+        if wp.static(dim > 1):
+            volume_ratio = wp.determinant(stretch)
+        density = nodes.density[i] / volume_ratio
+        h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / dim)))
+        nodes.displacement[i] = u
+        nodes.point[i].x = nodes.reference[i] + u
+        nodes.point[i].volume = nodes.weight[i] / density
+        nodes.density[i] = density
+        nodes.smoothing_length[i] = h
+        # A pair inside the support now was inside support + skin at `mark` while this holds at both its ends.
+        if wp.length(u - listed[i]) + support * wp.max(h - listed_h[i], real(0.0)) > half_skin:
+            outdated[0] = 1
+
+    return move
+
+
+@cache
+def centre_kernel(continuum: Continuum, precision: Precision):
+    """Places auxiliary nodes in the middle of their cells, with mean volume, density and smoothing length."""
+    types = node_types(continuum, precision)
+    real, vector = precision.real, types.vector
+    MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
+    corners = 2**continuum.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def centre(nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
+        a = wp.tid()
+        x = vector()
+        volume, density, h = real(0.0), real(0.0), real(0.0)
+        for k in range(wp.static(corners)):
+            i = auxiliary.cell[a, k]
+            x += nodes.point[i].x
+            volume += nodes.point[i].volume
+            density += nodes.density[i]
+            h += nodes.smoothing_length[i]
+        share = real(wp.static(1.0 / corners))
+        auxiliary.point[a].x = share * x
+        auxiliary.point[a].volume = share * volume
+        auxiliary.density[a] = share * density
+        auxiliary.smoothing_length[a] = share * h
+
+    return centre

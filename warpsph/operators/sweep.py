@@ -1,0 +1,87 @@
+"""Corrected values and gradients (METHOD section 2) from one pass over the neighbours.
+
+    value      φ_I  = Σ V_J φ_J W_IJ / Σ V_J W_IJ                                  (Shepard)
+    gradient   ∇φ_I = A_I⁻¹ Σ V_J (φ_J − φ_I) ∇W_IJ,   A_I = Σ V_J ∇W_IJ ⊗ (x_J − x_I)
+
+Both are linear in the neighbours' values, so one pass collects five sums and either follows from them, the
+gradient for any value φ_I of the point itself.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import warp as wp
+
+from ..ground.linear_algebra import symmetric_inverse
+from ..ground.precision import Precision
+from ..ground.smoothing import SMOOTHING_FUNCTIONS
+from ..nodes.neighbours import PairList
+from ..nodes.node_sets import node_types
+from ..scene.dimension import Continuum
+from ..scene.numerics import KERNELS
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The functions of one pass.
+
+    Attributes:
+        collect: (target index, its x and h, pair list, source points) → Sums.
+        value: (Sums, fallback) → Shepard value; the fallback where no neighbour is left.
+        gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
+    """
+
+    collect: wp.Function
+    value: wp.Function
+    gradient: wp.Function
+
+
+@cache
+def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
+    """The pass for one smoothing function."""
+    types = node_types(continuum, precision)
+    real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
+    phi_gradient, Point = types.phi_gradient, types.Point
+    weights = SMOOTHING_FUNCTIONS[kernel](precision)
+    inverse = symmetric_inverse(continuum.dim, precision)
+    support_squared = KERNELS[kernel].support ** 2
+
+    @wp.struct
+    class Sums:
+        w: real  # Σ V W
+        w_phi: phi  # Σ V W φ_J
+        g: vector  # Σ V ∇W
+        g_x: tensor  # Σ V ∇W ⊗ (x_J − x_I)
+        g_phi: phi_gradient  # Σ V φ_J ⊗ ∇W
+
+    @wp.func
+    def collect(target: int, x: vector, h: real, pairs: PairList, sources: wp.array(dtype=Point)):
+        sums = Sums()
+        per_h2 = real(1.0) / (h * h)
+        for k in range(pairs.start[target], pairs.start[target + 1]):
+            neighbour = sources[pairs.index[k]]
+            r = neighbour.x - x
+            s = wp.dot(r, r) * per_h2
+            if s < real(support_squared):
+                w, g = weights(s)
+                w *= neighbour.volume
+                grad_w = (g * neighbour.volume) * r
+                sums.w += w
+                sums.w_phi += w * neighbour.phi
+                sums.g += grad_w
+                sums.g_x += wp.outer(grad_w, r)
+                sums.g_phi += wp.outer(neighbour.phi, grad_w)
+        return sums
+
+    @wp.func
+    def value(sums: Sums, fallback: phi):
+        result = fallback
+        if sums.w > real(0.0):
+            result = sums.w_phi / sums.w
+        return result
+
+    @wp.func
+    def gradient(sums: Sums, own: phi):
+        return (sums.g_phi - wp.outer(own, sums.g)) * inverse(sums.g_x)
+
+    return Sweep(collect, value, gradient)

@@ -1,0 +1,53 @@
+"""Scene description: what a user writes. No Warp in here."""
+
+from .boundary import BoundaryTable
+from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
+from .dimension import BAR, PLANE_STRAIN, SOLID, Continuum
+from .functions import Linear, Pulse, Ramp, Table
+from .lattice import Lattice
+from .material import Elastic, PerzynaVonMises
+from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .output import EdgeForce, NodeValue, Output, Probe
+from .scene import BodyForce, Scene
+from .selection import edge, everywhere, region, where
+from .shape import Box, Disc, Mapped, Polygon, Shape
+
+__all__ = [
+    "BAR",
+    "KERNELS",
+    "PLANE_STRAIN",
+    "SOLID",
+    "SOURCE_SCHEMES",
+    "VELOCITY_SCHEMES",
+    "BodyForce",
+    "BoundaryTable",
+    "Box",
+    "Condition",
+    "Continuum",
+    "Disc",
+    "EdgeForce",
+    "Elastic",
+    "Fixed",
+    "Free",
+    "Lattice",
+    "Linear",
+    "Mapped",
+    "NodeValue",
+    "Numerics",
+    "Output",
+    "PerzynaVonMises",
+    "Polygon",
+    "PrescribedVelocity",
+    "Probe",
+    "Pulse",
+    "Ramp",
+    "Roller",
+    "Rotating",
+    "Scene",
+    "Shape",
+    "Table",
+    "edge",
+    "everywhere",
+    "region",
+    "where",
+]

@@ -1,0 +1,227 @@
+"""Boundary conditions on selections of nodes.
+
+Every condition prescribes, direction by direction, either the velocity or the traction. A `Free` edge
+prescribes all tractions (zero); `Fixed` all velocities (zero); a `Roller` the normal velocity and the
+tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and zero traction
+along the others. What happens where conditions meet is in `warpsph.scene.boundary`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SceneError
+from .selection import Selection
+from .validate import TimeFunction, instance, number, time_function, vector
+
+# One prescribed direction at every selected node: the unit vectors (k, d), and the target velocity along them
+# as a sum of terms, each a coefficient a node (k,) times a function of time.
+Row = tuple[np.ndarray, list[tuple[np.ndarray, TimeFunction]]]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition on the nodes of a selection."""
+
+    on: Selection
+
+    def __post_init__(self):
+        instance(f"{type(self).__name__}.on", self.on, Selection, "a selection such as edge('top')")
+
+    @property
+    def takes_normal(self) -> bool:
+        """Whether the condition has no meaning without an outward normal."""
+        return False
+
+    def rows(self, points: np.ndarray, normal: np.ndarray | None) -> list[Row]:
+        """Prescribed velocity directions at nodes that share one outward normal.
+
+        Args:
+            points: initial positions of the nodes [m], shape (k, d).
+            normal: one of the nodes' outward normals, shape (d,), or None when they have none.
+        """
+        raise NotImplementedError
+
+    def check(self, dim: int) -> None:
+        """Raise `SceneError` when the condition does not fit `dim` space dimensions."""
+
+
+@dataclass(frozen=True)
+class Fixed(Condition):
+    """No motion: v = 0."""
+
+    def rows(self, points, normal):
+        return [(_axis(points, axis), []) for axis in range(points.shape[1])]
+
+
+@dataclass(frozen=True)
+class Roller(Condition):
+    """A frictionless wall at rest: no normal velocity, no tangential traction.
+
+    Args:
+        on: the nodes.
+        normal: the wall's normal; that of the boundary faces unless given.
+    """
+
+    normal: tuple[float, ...] | None = None
+
+    def __post_init__(self):
+        super().__post_init__()
+        _store_normal(self)
+
+    @property
+    def takes_normal(self) -> bool:
+        return True
+
+    def rows(self, points, normal):
+        return [(np.broadcast_to(normal, points.shape), [])]
+
+    def check(self, dim):
+        _check_normal(self, dim)
+
+
+@dataclass(frozen=True)
+class PrescribedVelocity(Condition):
+    """Given velocity components; along the components left out (None) the traction is zero.
+
+    Args:
+        on: the nodes.
+        velocity: one entry an axis [m/s]: a number, a function of time f(t), or None. For example
+            `(None, Linear(-3e-3))` presses a smooth rigid footing downwards.
+    """
+
+    velocity: tuple[TimeFunction | None, ...] = ()
+
+    def __post_init__(self):
+        super().__post_init__()
+        allowed = "it must be a sequence of numbers, functions of time or None, one an axis, not all None"
+        try:
+            velocity = tuple(self.velocity)
+        except TypeError:
+            raise SceneError("PrescribedVelocity.velocity", self.velocity, allowed) from None
+        if all(value is None for value in velocity):
+            raise SceneError("PrescribedVelocity.velocity", velocity, allowed)
+        object.__setattr__(
+            self,
+            "velocity",
+            tuple(
+                None if value is None else time_function("PrescribedVelocity.velocity", value)
+                for value in velocity
+            ),
+        )
+
+    def rows(self, points, normal):
+        one = np.ones(len(points))
+        return [
+            (_axis(points, axis), [(one, value)])
+            for axis, value in enumerate(self.velocity)
+            if value is not None
+        ]
+
+    def check(self, dim):
+        if len(self.velocity) != dim:
+            raise SceneError("PrescribedVelocity.velocity", self.velocity, f"it needs {dim} components")
+
+
+@dataclass(frozen=True)
+class Rotating(Condition):
+    """Rigid rotation at a constant rate about an axis along z: the node moves on its own circle.
+
+    Args:
+        on: the nodes.
+        angular_velocity: Ω [rad/s], anticlockwise.
+        centre: centre of the circle (x, y) [m].
+    """
+
+    angular_velocity: float = 0.0
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self):
+        super().__post_init__()
+        rate = number("Rotating.angular_velocity", self.angular_velocity)
+        object.__setattr__(self, "angular_velocity", rate)
+        object.__setattr__(self, "centre", vector("Rotating.centre", self.centre, 2))
+
+    def rows(self, points, normal):
+        rate = self.angular_velocity
+        x, y = (points[:, :2] - np.array(self.centre)).T
+        cos, sin = Cosine(rate), Sine(rate)
+        rows = [
+            (_axis(points, 0), [(-rate * y, cos), (-rate * x, sin)]),
+            (_axis(points, 1), [(rate * x, cos), (-rate * y, sin)]),
+        ]
+        return rows + [(_axis(points, axis), []) for axis in range(2, points.shape[1])]
+
+    def check(self, dim):
+        if dim == 1:
+            raise SceneError("conditions", self, "Rotating needs a plane or a solid")
+
+
+@dataclass(frozen=True)
+class Free(Condition):
+    """A traction-free edge: σ n = 0, with the initial outward normal n.
+
+    Args:
+        on: the nodes.
+        normal: the edge's normal; that of the boundary faces unless given.
+    """
+
+    normal: tuple[float, ...] | None = None
+
+    def __post_init__(self):
+        super().__post_init__()
+        _store_normal(self)
+
+    @property
+    def takes_normal(self) -> bool:
+        return True
+
+    def rows(self, points, normal):
+        return []
+
+    def check(self, dim):
+        _check_normal(self, dim)
+
+
+@dataclass(frozen=True)
+class Cosine:
+    """f(t) = cos(rate · t)."""
+
+    rate: float
+
+    def __call__(self, t: float) -> float:
+        return math.cos(self.rate * t)
+
+
+@dataclass(frozen=True)
+class Sine:
+    """f(t) = sin(rate · t)."""
+
+    rate: float
+
+    def __call__(self, t: float) -> float:
+        return math.sin(self.rate * t)
+
+
+def _axis(points: np.ndarray, axis: int) -> np.ndarray:
+    return np.broadcast_to(np.eye(points.shape[1])[axis], points.shape)
+
+
+def _store_normal(condition: Roller | Free) -> None:
+    if condition.normal is None:
+        return
+    name = f"{type(condition).__name__}.normal"
+    normal = vector(name, condition.normal)
+    length = math.hypot(*normal)
+    if length == 0.0:
+        raise SceneError(name, normal, "it must not be the zero vector")
+    object.__setattr__(condition, "normal", tuple(part / length for part in normal))
+
+
+def _check_normal(condition: Roller | Free, dim: int) -> None:
+    if condition.normal is not None and len(condition.normal) != dim:
+        name = f"{type(condition).__name__}.normal"
+        raise SceneError(name, condition.normal, f"it needs {dim} components")

@@ -1,0 +1,87 @@
+"""How a scene is discretised: the choices of the method, by name, with their defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import SceneError
+from .dimension import Continuum
+from .validate import choice, number
+
+
+@dataclass(frozen=True)
+class SmoothingChoice:
+    """A smoothing function W(r/h) as far as a scene must know it.
+
+    Attributes:
+        support: radius of the support in smoothing lengths.
+        smoothing_ratio: default h/Δx.
+    """
+
+    support: float
+    smoothing_ratio: float
+
+
+# The defaults reach 1.8 Δx, a little beyond the 1.58 Δx (1.66 in 3D) that a corner node needs.
+KERNELS = {
+    "gaussian": SmoothingChoice(support=3.0, smoothing_ratio=0.6),
+    "cubic_spline": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
+    "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
+}
+VELOCITY_SCHEMES = ("blanc-pastor", "taylor")
+SOURCE_SCHEMES = ("rk4",)
+LARGEST_SUPPORT = 6.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numerics:
+    """Choices of the discretisation.
+
+    Args:
+        kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
+        smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given.
+        courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
+        velocity_scheme: `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the complete scheme).
+        source_scheme: `rk4` (sub-stepped where stiff).
+        time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
+    """
+
+    kernel: str = "gaussian"
+    smoothing_ratio: float | None = None
+    courant: float = 0.9
+    velocity_scheme: str = "blanc-pastor"
+    source_scheme: str = "rk4"
+    time_step: float | None = None
+
+    def __post_init__(self):
+        choice("kernel", self.kernel, KERNELS)
+        choice("velocity_scheme", self.velocity_scheme, VELOCITY_SCHEMES)
+        choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
+        ratio = KERNELS[self.kernel].smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
+        object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
+        object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
+        if self.time_step is not None:
+            object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
+
+    @property
+    def support(self) -> float:
+        """Radius of the support over spacing [-]."""
+        return KERNELS[self.kernel].support * self.smoothing_ratio
+
+    def check_support(self, continuum: Continuum, stretch: float = 1.0) -> None:
+        """Refuse a support that is too small (or absurdly large) for the lattice.
+
+        Args:
+            continuum: the continuum, for its number of dimensions.
+            stretch: longest cell edge over spacing, 1 on a regular lattice.
+        """
+        support = KERNELS[self.kernel].support
+        least = continuum.smallest_support * stretch / support
+        most = LARGEST_SUPPORT / support
+        if not least < self.smoothing_ratio <= most:
+            raise SceneError(
+                "smoothing_ratio",
+                self.smoothing_ratio,
+                f"with kernel {self.kernel} in {continuum.dim}D it must be above {least:.4g} (the support must "
+                f"reach {continuum.smallest_support * stretch:.3g} spacings) and at most {most:.3g}",
+            )

@@ -1,0 +1,135 @@
+"""A scene: everything a run needs to know, checked as it is built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import SceneError
+from .boundary import BoundaryTable, resolve
+from .condition import Condition
+from .lattice import Lattice
+from .material import Elastic
+from .numerics import Numerics
+from .output import Output
+from .shape import Shape
+from .validate import (
+    TimeFunction,
+    field_of_position,
+    flag,
+    instance,
+    number,
+    time_function,
+    vector,
+)
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """A uniform body force b(t) = acceleration · factor(t), for example gravity.
+
+    Args:
+        acceleration: [m/s²], one component an axis.
+        factor: a number or a function of time, e.g. `Ramp(1.0)`.
+    """
+
+    acceleration: tuple[float, ...]
+    factor: TimeFunction = 1.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "acceleration", vector("BodyForce.acceleration", self.acceleration))
+        object.__setattr__(self, "factor", time_function("BodyForce.factor", self.factor))
+
+    def __call__(self, t: float) -> np.ndarray:
+        factor = self.factor(t) if callable(self.factor) else self.factor
+        return factor * np.array(self.acceleration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A body, what it is made of, what is done to it, for how long, and what to record.
+
+    Args:
+        shape: the body with its lattice.
+        material: `Elastic` or `PerzynaVonMises`.
+        duration: simulated time [s].
+        conditions: boundary conditions; an edge without one keeps whatever traction it has.
+        body_force: uniform body force, or None.
+        damping: mass-proportional damping c [1/s]: dv/dt = … − c v.
+        velocity: initial velocity [m/s], a function of position f(x, y, …) → one part an axis; rest unless given.
+        stress: initial stress [Pa], a function of position → one part a stored component
+            (bar s11; plane strain s11, s22, s12, s33; solid s11, s22, s33, s12, s13, s23); zero unless given.
+        large_displacements: whether nodes move and stresses turn with them (updated Lagrangian); if not, the
+            initial configuration is kept (small strains).
+        numerics: choices of the discretisation.
+        output: what to record.
+        name: a short name, for messages and results.
+
+    Raises:
+        SceneError: a field is not allowed; the message names it, its value and what is allowed.
+    """
+
+    shape: Shape
+    material: Elastic
+    duration: float
+    conditions: tuple[Condition, ...] = ()
+    body_force: BodyForce | None = None
+    damping: float = 0.0
+    velocity: Callable | None = None
+    stress: Callable | None = None
+    large_displacements: bool = True
+    numerics: Numerics = field(default_factory=Numerics)
+    output: Output = field(default_factory=Output)
+    name: str = "scene"
+
+    def __post_init__(self):
+        instance("shape", self.shape, Shape, "a shape such as Box(size=(1, 1), spacing=0.1)")
+        instance("material", self.material, Elastic, "a material such as Elastic(…)")
+        instance("numerics", self.numerics, Numerics, "Numerics(…)")
+        instance("output", self.output, Output, "Output(…)")
+        instance("name", self.name, str, "a string")
+        object.__setattr__(self, "duration", number("duration", self.duration, above=0.0))
+        object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
+        flag("large_displacements", self.large_displacements)
+        try:
+            object.__setattr__(self, "conditions", tuple(self.conditions))
+        except TypeError:
+            raise SceneError("conditions", self.conditions, "it must be a sequence of conditions") from None
+        for index, condition in enumerate(self.conditions):
+            instance(f"conditions[{index}]", condition, Condition, "a condition such as Fixed(edge('left'))")
+        dim = self.lattice.dim
+        if self.body_force is not None:
+            instance("body_force", self.body_force, BodyForce, "BodyForce(…) or None")
+            vector("BodyForce.acceleration", self.body_force.acceleration, dim)
+        self.numerics.check_support(self.lattice.continuum, self.lattice.largest_edge() / self.lattice.spacing)
+        _ = self.boundary, self.initial_velocity, self.initial_stress
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """The initial nodes, cells and faces."""
+        return self.shape.lattice()
+
+    @cached_property
+    def boundary(self) -> BoundaryTable:
+        """The conditions, resolved node by node."""
+        return resolve(self.lattice, self.conditions)
+
+    @cached_property
+    def initial_velocity(self) -> np.ndarray:
+        """[m/s], shape (n, d)."""
+        return self._initial("velocity", self.velocity, self.lattice.dim)
+
+    @cached_property
+    def initial_stress(self) -> np.ndarray:
+        """[Pa], shape (n, s)."""
+        return self._initial("stress", self.stress, self.lattice.continuum.stress_size)
+
+    def _initial(self, name: str, function: Callable | None, size: int) -> np.ndarray:
+        if function is None:
+            return np.zeros((len(self.lattice.nodes), size))
+        if not callable(function):
+            raise SceneError(name, function, "it must be a function of position f(x, y, …) or None")
+        return field_of_position(name, function, self.lattice.nodes, size)

@@ -1,0 +1,156 @@
+"""Selections of nodes: named edges, boxes, functions of position, and their combinations.
+
+A selection answers two questions about a lattice: which nodes it holds, and which boundary faces may give
+those nodes a normal. `edge("top") & where(lambda x, y: x <= 1.0)` holds the nodes of the top with x ≤ 1, and
+only top faces give them a normal, also at the corner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SceneError, one_of
+from .lattice import Lattice
+from .validate import field_of_position, vector
+
+
+class Selection:
+    """A set of nodes; combine with `&`, `|` and `~`."""
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        """Which nodes are selected, boolean, shape (n,)."""
+        raise NotImplementedError
+
+    def faces(self, lattice: Lattice) -> np.ndarray:
+        """Which boundary faces may give a normal, boolean, shape (f,)."""
+        return np.ones(len(lattice.faces), dtype=bool)
+
+    def __and__(self, other: Selection) -> Selection:
+        return Both(self, _selection(other))
+
+    def __or__(self, other: Selection) -> Selection:
+        return Either(self, _selection(other))
+
+    def __invert__(self) -> Selection:
+        return Outside(self)
+
+
+@dataclass(frozen=True)
+class edge(Selection):  # noqa: N801 - written as a word in scenes
+    """The nodes of a named edge: left, right, bottom, top, in 3D also front and back; `boundary` is all.
+
+    Names refer to the axes of the lattice before it was rotated or mapped.
+    """
+
+    name: str
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        mask = np.zeros(len(lattice.nodes), dtype=bool)
+        mask[lattice.faces[self.faces(lattice)]] = True
+        return mask
+
+    def faces(self, lattice: Lattice) -> np.ndarray:
+        names = lattice.continuum.edges
+        if self.name == "boundary":
+            return np.ones(len(lattice.faces), dtype=bool)
+        if self.name not in names:
+            raise SceneError("edge", self.name, one_of((*names, "boundary"), self.name))
+        return lattice.face_side == names.index(self.name)
+
+
+@dataclass(frozen=True)
+class region(Selection):  # noqa: N801
+    """The nodes inside a box, its sides included (to a millionth of the spacing).
+
+    Args:
+        lower, upper: opposite corners [m].
+    """
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def __post_init__(self):
+        lower = vector("region.lower", self.lower)
+        upper = vector("region.upper", self.upper, len(lower))
+        if any(a > b for a, b in zip(lower, upper, strict=True)):
+            raise SceneError("region.upper", upper, f"it must not be below region.lower = {lower}")
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        if len(self.lower) != lattice.dim:
+            raise SceneError("region.lower", self.lower, f"the shape has {lattice.dim} dimension(s)")
+        slack = 1e-6 * lattice.spacing
+        low, high = np.array(self.lower) - slack, np.array(self.upper) + slack
+        return ((lattice.nodes >= low) & (lattice.nodes <= high)).all(axis=1)
+
+
+@dataclass(frozen=True)
+class where(Selection):  # noqa: N801
+    """The nodes where a function of the initial position, f(x, y, …) with arrays, is true.
+
+    Coordinates are rounded to 12 digits of the body's extent, so that `x <= 0.3` holds on a node at 0.3.
+    """
+
+    function: Callable
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        extent = max(np.abs(lattice.nodes).max(), lattice.spacing)
+        decimals = 12 - int(np.ceil(np.log10(extent)))
+        points = np.round(lattice.nodes, decimals)
+        return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
+
+
+@dataclass(frozen=True)
+class everywhere(Selection):  # noqa: N801
+    """All nodes."""
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        return np.ones(len(lattice.nodes), dtype=bool)
+
+
+@dataclass(frozen=True)
+class Both(Selection):
+    """Nodes in both selections."""
+
+    first: Selection
+    second: Selection
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        return self.first.nodes(lattice) & self.second.nodes(lattice)
+
+    def faces(self, lattice: Lattice) -> np.ndarray:
+        return self.first.faces(lattice) & self.second.faces(lattice)
+
+
+@dataclass(frozen=True)
+class Either(Selection):
+    """Nodes in at least one of the selections."""
+
+    first: Selection
+    second: Selection
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        return self.first.nodes(lattice) | self.second.nodes(lattice)
+
+    def faces(self, lattice: Lattice) -> np.ndarray:
+        return self.first.faces(lattice) | self.second.faces(lattice)
+
+
+@dataclass(frozen=True)
+class Outside(Selection):
+    """Nodes not in the selection."""
+
+    inner: Selection
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        return ~self.inner.nodes(lattice)
+
+
+def _selection(value: object) -> Selection:
+    if not isinstance(value, Selection):
+        raise SceneError("selection", value, "it must be edge(…), region(…), where(…) or a combination")
+    return value
