@@ -1,0 +1,88 @@
+"""warpsph: large-deformation solid and soil dynamics by Runge-Kutta Taylor SPH on NVIDIA Warp.
+
+A scene is built from named parts and run by a `Simulation`:
+
+>>> from warpsph import Box, Elastic, Fixed, Scene, Simulation, edge
+>>> scene = Scene(
+...     shape=Box(size=(1.0,), spacing=0.1),
+...     material=Elastic(young_modulus=8e7, density=2000.0),
+...     conditions=[Fixed(edge("left"))],
+...     velocity=lambda x: 1e-3 * x,
+...     duration=1e-3,
+... )
+>>> simulation = Simulation(scene, device="cpu")
+>>> simulation.run()
+>>> simulation.field("stress").shape
+(11, 1)
+"""
+
+from .errors import NonFiniteError, SceneError, WarpSPHError
+from .scene import (
+    BodyForce,
+    Box,
+    Check,
+    Disc,
+    EdgeForce,
+    Elastic,
+    Fixed,
+    Free,
+    Linear,
+    NodeValue,
+    Numerics,
+    Output,
+    PerzynaVonMises,
+    Polygon,
+    PrescribedVelocity,
+    Probe,
+    Pulse,
+    Ramp,
+    Roller,
+    Rotating,
+    Scene,
+    Shape,
+    Table,
+    edge,
+    everywhere,
+    region,
+    where,
+)
+from .simulation.history import History
+from .simulation.simulation import Observer, Simulation
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "BodyForce",
+    "Box",
+    "Check",
+    "Disc",
+    "EdgeForce",
+    "Elastic",
+    "Fixed",
+    "Free",
+    "History",
+    "Linear",
+    "NodeValue",
+    "NonFiniteError",
+    "Numerics",
+    "Observer",
+    "Output",
+    "PerzynaVonMises",
+    "Polygon",
+    "PrescribedVelocity",
+    "Probe",
+    "Pulse",
+    "Ramp",
+    "Roller",
+    "Rotating",
+    "Scene",
+    "SceneError",
+    "Shape",
+    "Simulation",
+    "Table",
+    "WarpSPHError",
+    "edge",
+    "everywhere",
+    "region",
+    "where",
+]

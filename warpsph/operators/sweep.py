@@ -4,7 +4,8 @@
     gradient   ∇φ_I = A_I⁻¹ Σ V_J (φ_J − φ_I) ∇W_IJ,   A_I = Σ V_J ∇W_IJ ⊗ (x_J − x_I)
 
 Both are linear in the neighbours' values, so one pass collects five sums and either follows from them, the
-gradient for any value φ_I of the point itself.
+gradient for any value φ_I of the point itself. The sums are taken of differences from a base value near the
+neighbours' (the one the target had last): in float32 the sums of the values themselves would cancel.
 """
 
 from dataclasses import dataclass
@@ -26,8 +27,8 @@ class Sweep:
     """The functions of one pass.
 
     Attributes:
-        collect: (target index, its x and h, pair list, source points) → Sums.
-        value: (Sums, fallback) → Shepard value; the fallback where no neighbour is left.
+        collect: (target index, its x and h, base value, pair list, source points) → Sums.
+        value: Sums → Shepard value; the base value where no neighbour is left.
         gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
     """
 
@@ -49,14 +50,18 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     @wp.struct
     class Sums:
         w: real  # Σ V W
-        w_phi: phi  # Σ V W φ_J
+        base: phi
+        w_phi: phi  # Σ V W (φ_J − base)
         g: vector  # Σ V ∇W
         g_x: tensor  # Σ V ∇W ⊗ (x_J − x_I)
-        g_phi: phi_gradient  # Σ V φ_J ⊗ ∇W
+        g_phi: phi_gradient  # Σ V (φ_J − base) ⊗ ∇W
 
     @wp.func
-    def collect(target: int, x: vector, h: real, pairs: PairList, sources: wp.array(dtype=Point)):
+    def collect(
+        target: int, x: vector, h: real, base: phi, pairs: PairList, sources: wp.array(dtype=Point)
+    ):
         sums = Sums()
+        sums.base = base
         per_h2 = real(1.0) / (h * h)
         for k in range(pairs.start[target], pairs.start[target + 1]):
             neighbour = sources[pairs.index[k]]
@@ -67,21 +72,22 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
                 w *= neighbour.volume
                 grad_w = (g * neighbour.volume) * r
                 sums.w += w
-                sums.w_phi += w * neighbour.phi
+                difference = neighbour.phi - base
+                sums.w_phi += w * difference
                 sums.g += grad_w
                 sums.g_x += wp.outer(grad_w, r)
-                sums.g_phi += wp.outer(neighbour.phi, grad_w)
+                sums.g_phi += wp.outer(difference, grad_w)
         return sums
 
     @wp.func
-    def value(sums: Sums, fallback: phi):
-        result = fallback
+    def value(sums: Sums):
+        result = sums.base
         if sums.w > real(0.0):
-            result = sums.w_phi / sums.w
+            result += sums.w_phi / sums.w
         return result
 
     @wp.func
     def gradient(sums: Sums, own: phi):
-        return (sums.g_phi - wp.outer(own, sums.g)) * inverse(sums.g_x)
+        return (sums.g_phi - wp.outer(own - sums.base, sums.g)) * inverse(sums.g_x)
 
     return Sweep(collect, value, gradient)

@@ -1,6 +1,7 @@
 """Scene description: what a user writes. No Warp in here."""
 
 from .boundary import BoundaryTable
+from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from .dimension import BAR, PLANE_STRAIN, SOLID, Continuum
 from .functions import Linear, Pulse, Ramp, Table
@@ -22,6 +23,7 @@ __all__ = [
     "BodyForce",
     "BoundaryTable",
     "Box",
+    "Check",
     "Condition",
     "Continuum",
     "Disc",

@@ -91,9 +91,11 @@ class PrescribedVelocity(Condition):
         on: the nodes.
         velocity: one entry an axis [m/s]: a number, a function of time f(t), or None. For example
             `(None, Linear(-3e-3))` presses a smooth rigid footing downwards.
+        normal: the face's normal, for the tractions; that of the boundary faces unless given.
     """
 
     velocity: tuple[TimeFunction | None, ...] = ()
+    normal: tuple[float, ...] | None = None
 
     def __post_init__(self):
         super().__post_init__()
@@ -104,6 +106,7 @@ class PrescribedVelocity(Condition):
             raise SceneError("PrescribedVelocity.velocity", self.velocity, allowed) from None
         if all(value is None for value in velocity):
             raise SceneError("PrescribedVelocity.velocity", velocity, allowed)
+        _store_normal(self)
         object.__setattr__(
             self,
             "velocity",
@@ -124,6 +127,7 @@ class PrescribedVelocity(Condition):
     def check(self, dim):
         if len(self.velocity) != dim:
             raise SceneError("PrescribedVelocity.velocity", self.velocity, f"it needs {dim} components")
+        _check_normal(self, dim)
 
 
 @dataclass(frozen=True)
@@ -210,7 +214,7 @@ def _axis(points: np.ndarray, axis: int) -> np.ndarray:
     return np.broadcast_to(np.eye(points.shape[1])[axis], points.shape)
 
 
-def _store_normal(condition: Roller | Free) -> None:
+def _store_normal(condition: Roller | PrescribedVelocity | Free) -> None:
     if condition.normal is None:
         return
     name = f"{type(condition).__name__}.normal"
@@ -221,7 +225,7 @@ def _store_normal(condition: Roller | Free) -> None:
     object.__setattr__(condition, "normal", tuple(part / length for part in normal))
 
 
-def _check_normal(condition: Roller | Free, dim: int) -> None:
+def _check_normal(condition: Roller | PrescribedVelocity | Free, dim: int) -> None:
     if condition.normal is not None and len(condition.normal) != dim:
         name = f"{type(condition).__name__}.normal"
         raise SceneError(name, condition.normal, f"it needs {dim} components")

@@ -155,8 +155,8 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     ):
         a = wp.tid()
         point = auxiliary.point[a]
-        sums = collect(a, point.x, auxiliary.smoothing_length[a], pairs, nodes.point)
-        phi = value(sums, point.phi)  # 3
+        sums = collect(a, point.x, auxiliary.smoothing_length[a], point.phi, pairs, nodes.point)
+        phi = value(sums)  # 3
         minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
         auxiliary.point[a].phi = phi + real(0.5) * dt * minus_div_f  # 6
 
@@ -185,8 +185,8 @@ def _to_nodes_kernel(continuum: Continuum, precision: Precision, kernel: str, Pa
     ):
         i = wp.tid()
         point = nodes.point[i]
-        sums = collect(i, point.x, nodes.smoothing_length[i], pairs, auxiliary.point)
-        phi_half = apply(i, value(sums, point.phi), conditions)  # 7
+        sums = collect(i, point.x, nodes.smoothing_length[i], point.phi, pairs, auxiliary.point)
+        phi_half = apply(i, value(sums), conditions)  # 7
         grad = gradient(sums, phi_half)
         minus_div_f = rate(grad, real(1.0) / nodes.density[i], material)  # 8-9
 

@@ -1,0 +1,26 @@
+"""Shared by all tests: the devices to run on."""
+
+import pytest
+import warp as wp
+
+from warpsph.simulation.device import start_warp
+
+start_warp()
+
+
+
+def _cuda():
+    reason = "no CUDA device on this machine"
+    return pytest.param("cuda:0", marks=[pytest.mark.cuda, pytest.mark.skipif(not wp.is_cuda_available(), reason=reason)])
+
+
+@pytest.fixture(params=["cpu", _cuda()])
+def device(request):
+    """Each device the test runs on: the CPU, and a GPU where there is one."""
+    return request.param
+
+
+@pytest.fixture(params=["float64", "float32"])
+def precision(request):
+    """Both precisions."""
+    return request.param

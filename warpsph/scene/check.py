@@ -1,0 +1,50 @@
+"""A check of a run: a value against a reference, with a bound on the error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the table that judges a run.
+
+    Args:
+        name: what is checked.
+        value: what the run gave.
+        reference: what it should be.
+        unit: unit of both.
+        bound: largest allowed error.
+        relative: whether the error is |value − reference| / |reference|; the plain difference if not.
+    """
+
+    name: str
+    value: float
+    reference: float
+    unit: str
+    bound: float
+    relative: bool = True
+
+    @property
+    def error(self) -> float:
+        """The error, relative or absolute."""
+        difference = abs(self.value - self.reference)
+        return difference / abs(self.reference) if self.relative else difference
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is finite and within the bound."""
+        return math.isfinite(self.error) and self.error <= self.bound
+
+    def as_dict(self) -> dict:
+        """The check as it stands in `summary.json`."""
+        return {
+            "name": self.name,
+            "value": float(self.value),
+            "reference": float(self.reference),
+            "unit": self.unit,
+            "error": float(self.error),
+            "bound": float(self.bound),
+            "passed": bool(self.passed),
+        }

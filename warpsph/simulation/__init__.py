@@ -1,0 +1,1 @@
+"""Runs a scene and lets observers look at it."""

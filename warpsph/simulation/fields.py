@@ -1,0 +1,101 @@
+"""The node fields a simulation exposes, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene.dimension import Continuum
+from ..scene.material import PerzynaVonMises
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of the material nodes.
+
+    Attributes:
+        unit: its unit.
+        shape: its shape; n nodes, d dimensions, s stored stress components.
+        meaning: what it is.
+        read: simulation → NumPy array.
+        available: scene → whether the scene has it.
+    """
+
+    unit: str
+    shape: str
+    meaning: str
+    read: Callable[[object], np.ndarray]
+    available: Callable[[object], bool] = lambda scene: True
+
+
+def _has_yield(scene) -> bool:
+    return isinstance(scene.material, PerzynaVonMises)
+
+
+def _phi(simulation) -> np.ndarray:
+    return simulation.nodes.point.numpy()["phi"]
+
+
+def _stress(simulation) -> np.ndarray:
+    return _phi(simulation)[:, simulation.lattice.dim :].copy()
+
+
+def _yield_size(simulation) -> np.ndarray:
+    material, eps = simulation.scene.material, simulation.history.numpy()[:, 0]
+    return np.maximum(
+        material.yield_size + material.hardening * eps, material.residual_ratio * material.yield_size
+    )
+
+
+def von_mises(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
+    """q = √(3 J₂) [Pa] of stored stresses (n, s); |σ| in a bar."""
+    return np.sqrt(1.5 * np.sum(_deviator(stress, continuum) ** 2, axis=(1, 2)))
+
+
+def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
+    """tr σ/3 [Pa], tension positive; σ/3 in a bar."""
+    return np.trace(_tensor(stress, continuum), axis1=1, axis2=2) / 3.0
+
+
+def _tensor(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
+    full = np.zeros((len(stress), 3, 3))
+    for k, (i, j) in enumerate(continuum.pairs):
+        full[:, i, j] = full[:, j, i] = stress[:, k]
+    return full
+
+
+def _deviator(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
+    return _tensor(stress, continuum) - mean_stress(stress, continuum)[:, None, None] * np.eye(3)
+
+
+FIELDS: dict[str, Field] = {
+    "position": Field("m", "(n, d)", "current position x", lambda s: s.nodes.point.numpy()["x"].copy()),
+    "displacement": Field("m", "(n, d)", "u = x − X", lambda s: s.nodes.displacement.numpy().copy()),
+    "velocity": Field("m/s", "(n, d)", "velocity v", lambda s: _phi(s)[:, : s.lattice.dim].copy()),
+    "stress": Field("Pa", "(n, s)", "Cauchy stress σ, stored components, tension positive", _stress),
+    "von_mises_stress": Field(
+        "Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.lattice.continuum)
+    ),
+    "mean_stress": Field(
+        "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.lattice.continuum)
+    ),
+    "equivalent_plastic_strain": Field(
+        "-", "(n,)", "equivalent viscoplastic strain ε̄", lambda s: s.history.numpy()[:, 0].copy(), _has_yield
+    ),
+    "yield_size": Field("Pa", "(n,)", "size of the yield surface Y", _yield_size, _has_yield),
+    "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
+    "smoothing_length": Field(
+        "m", "(n,)", "smoothing length h", lambda s: s.nodes.smoothing_length.numpy().copy()
+    ),
+    "velocity_gradient": Field(
+        "1/s", "(n, d, d)", "L = ∂v_i/∂x_j of v^{n+1/2}", lambda s: s.nodes.velocity_gradient.numpy().copy()
+    ),
+    "mass": Field(
+        "kg",
+        "(n,)",
+        "mass of the node (per metre of thickness in plane strain, per square metre of section in a bar)",
+        lambda s: s.scene.material.density * s.lattice.node_volumes()[0],
+    ),
+}

@@ -1,0 +1,138 @@
+"""A simulation: a scene on a device, run step by step or until a time."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterable
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import NonFiniteError, SceneError, one_of
+from ..ground.precision import precision as precision_of
+from ..scene.scene import Scene
+from ..scene.validate import instance, number, vector
+from ..step.step import Stepper
+from .device import choose_device
+from .fields import FIELDS
+from .time_step import divide, time_step_limit
+
+
+class Observer(Protocol):
+    """Something told after every step. Observers only read."""
+
+    def observe(self, simulation: Simulation) -> None:
+        """Look at the simulation."""
+
+
+class Simulation:
+    """Runs a scene.
+
+    Args:
+        scene: the scene.
+        device: Warp device name, e.g. `cpu` or `cuda:0`; the first GPU, or else the CPU, unless given.
+        precision: `float64` or `float32`.
+
+    Attributes:
+        scene: the scene.
+        lattice: its initial lattice.
+        time: simulated time [s].
+        steps: number of steps made.
+        time_step_limit: largest Δt the scene allows [s].
+        shortest_step, longest_step: smallest and largest Δt used so far [s].
+        wall_time: seconds spent in `step`, without the start.
+        nodes, auxiliary, history: the arrays on the device.
+
+    Raises:
+        SceneError: the device, the precision or the time step is not allowed.
+    """
+
+    def __init__(self, scene: Scene, device: str | None = None, precision: str = "float64"):
+        self.scene = instance("scene", scene, Scene, "a Scene")
+        self.precision = precision_of(precision)
+        self.device = choose_device(device)
+        self.lattice = scene.lattice
+        self.time_step_limit = time_step_limit(scene)
+        self._stepper = Stepper(scene, self.precision, self.device)
+        self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
+        self.history = self._stepper.history
+        self.time, self.steps, self.wall_time = 0.0, 0, 0.0
+        self.shortest_step, self.longest_step = float("inf"), 0.0
+
+    def step(self, time_step: float | None = None) -> None:
+        """Advance by one time step.
+
+        Args:
+            time_step: Δt [s]; `time_step_limit` unless given, which it must not exceed.
+
+        Raises:
+            NonFiniteError: velocity or stress stopped being finite.
+        """
+        dt = self.time_step_limit
+        if time_step is not None:
+            dt = number("time_step", time_step, above=0.0, at_most=self.time_step_limit)
+        self._advance(dt)
+
+    def run(self, until: float | None = None, observers: Iterable[Observer] = ()) -> None:
+        """Advance in equal steps until a time, telling the observers after every step.
+
+        Args:
+            until: simulated time [s]; the scene's duration unless given.
+            observers: told after every step.
+
+        Raises:
+            NonFiniteError: velocity or stress stopped being finite; what the observers have stays theirs.
+        """
+        end = self.scene.duration if until is None else number("until", until, at_least=self.time)
+        observers = tuple(observers)
+        if end == self.time:
+            return
+        start = self.time
+        steps, dt = divide(end - start, self.time_step_limit)
+        for k in range(1, steps + 1):
+            self._advance(dt)
+            self.time = start + (end - start) * (k / steps)
+            for observer in observers:
+                observer.observe(self)
+
+    def _advance(self, dt: float) -> None:
+        begin = clock.perf_counter()
+        self._stepper.step(self.steps + 1, self.time, dt)
+        self.steps += 1
+        self.time += dt
+        self.shortest_step = min(self.shortest_step, dt)
+        self.longest_step = max(self.longest_step, dt)
+        bad = self._stepper.first_non_finite()
+        self.wall_time += clock.perf_counter() - begin
+        if bad is not None:
+            node, step = bad
+            raise NonFiniteError(step, self.time, node, self.lattice.nodes[node])
+
+    def field(self, name: str) -> np.ndarray:
+        """A copy of a node field as a NumPy array; see `fields` for the names.
+
+        Raises:
+            SceneError: this scene has no field of that name.
+        """
+        names = [key for key, value in FIELDS.items() if value.available(self.scene)]
+        if name not in names:
+            raise SceneError("field", name, one_of(names, name))
+        return FIELDS[name].read(self)
+
+    def fields(self) -> dict[str, str]:
+        """The fields of this scene: name → "shape [unit] meaning"."""
+        return {
+            name: f"{field.shape} [{field.unit}] {field.meaning}"
+            for name, field in FIELDS.items()
+            if field.available(self.scene)
+        }
+
+    def nearest_node(self, point: Iterable[float]) -> int:
+        """Index of the material node that is initially nearest to a point [m]."""
+        target = np.array(vector("point", tuple(point), self.lattice.dim))
+        return int(np.argmin(((self.lattice.nodes - target) ** 2).sum(axis=1)))
+
+    @property
+    def list_builds(self) -> int:
+        """How often the pair lists were built."""
+        return self._stepper.list_builds

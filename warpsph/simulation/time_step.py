@@ -1,0 +1,75 @@
+"""The time step of a scene: from the Courant number and the stiffness of the sources."""
+
+from __future__ import annotations
+
+import math
+
+from ..errors import SceneError
+from ..ground.precision import PRECISIONS
+from ..ground.smoothing import SMOOTHING_FUNCTIONS, second_moment
+from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
+from ..scene.material import PerzynaVonMises
+from ..scene.numerics import KERNELS
+from ..scene.scene import Scene
+
+ROUNDING = 1e-9
+
+
+def courant_limit(scene: Scene) -> float:
+    """Largest stable c_p Δt/Δx of the wave part, 2 √m₂ (METHOD section 3)."""
+    numerics, precision = scene.numerics, PRECISIONS["float64"]
+    weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
+    return 2.0 * math.sqrt(
+        second_moment(weight, precision, numerics.smoothing_ratio, KERNELS[numerics.kernel].support)
+    )
+
+
+def time_step_limit(scene: Scene) -> float:
+    """Δt [s]: the one the scene gives, or C Δx/c_p, reduced where sub-stepping could not follow the flow.
+
+    Δx is the smallest initial distance across a cell. RK4 sources are sub-stepped up to `MOST_SUBSTEPS` times
+    a half step, each λ Δt ≤ `STIFFNESS_LIMIT`; λ is taken at q = 2Y, where N > 1 is as stiff as it gets in
+    slow loading.
+
+    Raises:
+        SceneError: the Courant number (or the given time step) is beyond the wave limit.
+    """
+    numerics, material, lattice = scene.numerics, scene.material, scene.lattice
+    per_courant = lattice.smallest_edge() / material.wave_speed(lattice.dim)
+    limit = courant_limit(scene)
+    if numerics.time_step is not None:
+        if numerics.time_step > limit * per_courant * (1.0 + ROUNDING):
+            raise SceneError(
+                "time_step", numerics.time_step, f"it must be at most {limit * per_courant:.6g} s"
+            )
+        return numerics.time_step
+    if numerics.courant > limit * (1.0 + ROUNDING):
+        raise SceneError(
+            "courant",
+            numerics.courant,
+            f"with kernel {numerics.kernel} and smoothing_ratio {numerics.smoothing_ratio:g} waves are stable "
+            f"up to {limit:.4g}",
+        )
+    dt = numerics.courant * per_courant
+    if isinstance(material, PerzynaVonMises) and material.fluidity > 0.0:
+        rate = (
+            material.relaxation_modulus(lattice.dim)
+            * material.fluidity
+            * material.exponent
+            / material.smallest_yield_size()
+        )
+        dt = min(dt, 2.0 * MOST_SUBSTEPS * STIFFNESS_LIMIT / rate)
+    return dt
+
+
+def divide(duration: float, limit: float) -> tuple[int, float]:
+    """Number and length of the equal steps, each at most `limit`, that fill a duration [s].
+
+    Equal steps, because a short last one would filter: the published velocity step smooths by a fixed amount
+    a step, however short.
+
+    >>> divide(1.0, 0.3)
+    (4, 0.25)
+    """
+    steps = max(1, math.ceil(duration / limit * (1.0 - ROUNDING)))
+    return steps, duration / steps
