@@ -37,6 +37,11 @@ class Sweep:
     gradient: wp.Function
 
 
+# A neighbour on the very edge of the support is outside, whatever its last bits say: at h = 0.5 Δx the Gaussian's
+# support ends on the lattice points at 1.5 Δx, and taking some of them in by rounding smears a front.
+EDGE = 1.0 - 1e-4
+
+
 @cache
 def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     """The pass for one smoothing function."""
@@ -45,7 +50,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     phi_gradient, Point = types.phi_gradient, types.Point
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
-    support_squared = KERNELS[kernel].support ** 2
+    support_squared = EDGE * KERNELS[kernel].support ** 2
 
     @wp.struct
     class Sums:
