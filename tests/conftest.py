@@ -8,10 +8,9 @@ from warpsph.simulation.device import start_warp
 start_warp()
 
 
-
 def _cuda():
-    reason = "no CUDA device on this machine"
-    return pytest.param("cuda:0", marks=[pytest.mark.cuda, pytest.mark.skipif(not wp.is_cuda_available(), reason=reason)])
+    absent = pytest.mark.skipif(not wp.is_cuda_available(), reason="no CUDA device on this machine")
+    return pytest.param("cuda:0", marks=[pytest.mark.cuda, absent])
 
 
 @pytest.fixture(params=["cpu", _cuda()])

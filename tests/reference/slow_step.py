@@ -359,9 +359,7 @@ def slow_step(state: dict, model: dict, t: float, dt: float) -> dict:
     v_s, sigma_s, eps_s = steps_1_2_and_11_12_sources(v, sigma, eps, L, t, 0.5 * dt, model)
 
     v_aux, sigma_aux = step_3_value_at_aux(nodes, aux, v_s, sigma_s, model)
-    v_aux_half, sigma_aux_half = steps_4_6_half_step_at_aux(
-        nodes, aux, v_aux, sigma_aux, v_s, sigma_s, dt, model
-    )
+    v_aux_half, sigma_aux_half = steps_4_6_half_step_at_aux(nodes, aux, v_aux, sigma_aux, v_s, sigma_s, dt, model)
     v_half, sigma_half = step_7_value_at_nodes(nodes, aux, v_aux_half, sigma_aux_half, t, dt, model)
     v_adv, sigma_adv, L_new = steps_8_10_advance_at_nodes(
         nodes, aux, v_half, sigma_half, v_aux_half, sigma_aux_half, v_s, sigma_s, dt, model

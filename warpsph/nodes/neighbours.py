@@ -37,6 +37,10 @@ class Neighbours:
         support: radius of the support in smoothing lengths.
         spacing: lattice spacing [m].
         skin: extra search radius [m].
+
+    Attributes:
+        pairs: the list, once built.
+        kernels: the kernels that make it.
     """
 
     def __init__(self, continuum, precision, targets, sources, support, spacing, skin):
@@ -44,6 +48,7 @@ class Neighbours:
         self._targets, self._sources = targets, sources
         self._support, self._skin, self._spacing = support, skin, spacing
         self._kernels = _list_kernels(continuum, precision)
+        self.kernels = (self._kernels.copy_points, self._kernels.count, self._kernels.fill)
         device = sources.point.device
         self._origin = np.array(sources.point.numpy()["x"].mean(axis=0), dtype=float)
         self._grid_points = wp.zeros(sources.point.shape[0], dtype=wp.vec3, device=device)
@@ -128,7 +133,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
         i = wp.tid()
         p = grid_point(targets[i].x, origin)
         radius = support * wp.float32(smoothing_length[i]) + margin
-        found = int(0)
+        found = wp.int32(0)
         for j in wp.hash_grid_query(grid, p, radius):
             if wp.length_sq(grid_points[j] - p) < radius * radius:
                 found += 1

@@ -76,6 +76,7 @@ class Conditions:
         self.table = condition_types(continuum, precision).Table()
         self._functions = boundary.functions
         self._kernel = _apply_kernel(continuum, precision)
+        self.kernels = (self._kernel,)
         row = np.full(n, -1, dtype=np.int32)
         row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
         self._fill(row, boundary, types, continuum, precision, device)

@@ -14,6 +14,8 @@ from ..scene.dimension import Continuum
 class NoMotion:
     """Small displacements: the initial configuration is kept."""
 
+    kernels: tuple[wp.Kernel, ...] = ()
+
     def move(self, nodes, auxiliary, dt: float) -> None:
         """Nothing."""
 
@@ -44,6 +46,7 @@ class Motion:
         self._outdated = wp.zeros(1, dtype=wp.int32, device=device)
         self._kernel = _move_kernel(continuum, precision)
         self._centre = centre_kernel(continuum, precision)
+        self.kernels = (self._kernel, self._centre)
 
     def mark(self, nodes) -> None:
         """Remember where the nodes are now: the pair lists were just built for this."""

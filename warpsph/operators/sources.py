@@ -29,6 +29,8 @@ MOST_SUBSTEPS = 64
 class NoSources:
     """An elastic scene without spin and body force: nothing to do."""
 
+    kernels: tuple[wp.Kernel, ...] = ()
+
     def half_step(self, nodes, history, t: float, dt: float) -> None:
         """Nothing."""
 
@@ -54,6 +56,7 @@ class Sources:
             spins=spins(scene),
             accelerates=scene.body_force is not None or scene.damping > 0.0,
         )
+        self.kernels = (self._kernel,)
 
     def half_step(self, nodes, history, t: float, dt: float) -> None:
         """Advance the nodes by their sources alone from t to t + dt.

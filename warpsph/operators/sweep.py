@@ -62,9 +62,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         g_phi: phi_gradient  # Σ V (φ_J − base) ⊗ ∇W
 
     @wp.func
-    def collect(
-        target: int, x: vector, h: real, base: phi, pairs: PairList, sources: wp.array(dtype=Point)
-    ):
+    def collect(target: int, x: vector, h: real, base: phi, pairs: PairList, sources: wp.array(dtype=Point)):
         sums = Sums()
         sums.base = base
         per_h2 = real(1.0) / (h * h)

@@ -9,6 +9,7 @@ from .lattice import Lattice
 from .material import Elastic, PerzynaVonMises
 from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
+from .parameter import Parameter
 from .scene import BodyForce, Scene
 from .selection import edge, everywhere, region, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
@@ -37,6 +38,7 @@ __all__ = [
     "NodeValue",
     "Numerics",
     "Output",
+    "Parameter",
     "PerzynaVonMises",
     "Polygon",
     "PrescribedVelocity",

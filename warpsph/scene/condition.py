@@ -119,9 +119,7 @@ class PrescribedVelocity(Condition):
     def rows(self, points, normal):
         one = np.ones(len(points))
         return [
-            (_axis(points, axis), [(one, value)])
-            for axis, value in enumerate(self.velocity)
-            if value is not None
+            (_axis(points, axis), [(one, value)]) for axis, value in enumerate(self.velocity) if value is not None
         ]
 
     def check(self, dim):

@@ -48,9 +48,7 @@ class Continuum:
 
 
 BAR = Continuum("bar", 1, ((0, 0),), ("left", "right"))
-PLANE_STRAIN = Continuum(
-    "plane_strain", 2, ((0, 0), (1, 1), (0, 1), (2, 2)), ("left", "right", "bottom", "top")
-)
+PLANE_STRAIN = Continuum("plane_strain", 2, ((0, 0), (1, 1), (0, 1), (2, 2)), ("left", "right", "bottom", "top"))
 SOLID = Continuum(
     "solid",
     3,

@@ -79,5 +79,3 @@ class Table:
 
     def __call__(self, t: float) -> float:
         return float(np.interp(t, self.times, self.values))
-
-

@@ -105,7 +105,9 @@ class Output:
     Args:
         probes: the columns of the history, besides step and time.
         interval: simulated time between samples [s]; every step when 0; duration/400 unless given.
-        curve: names of the probes on the x and y axis of the history plot (`time` is one too).
+        curve: names of the probes on the x and y axis of the history plot (`time` is one too); the first probe
+            against time unless given.
+        curve_reference: a label and a value to draw as a line across that plot.
         field: node field to draw at the end.
         component: component of that field.
     """
@@ -113,6 +115,7 @@ class Output:
     probes: tuple[Probe, ...] = ()
     interval: float | None = None
     curve: tuple[str, str] | None = None
+    curve_reference: tuple[str, float] | None = None
     field: str = "velocity"
     component: int = 0
 

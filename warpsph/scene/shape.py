@@ -148,9 +148,7 @@ class Polygon(Shape):
 
     def lattice(self) -> Lattice:
         corners = np.array(self.vertices)
-        return _cut(
-            lambda p: _inside_polygon(p, corners), corners.min(axis=0), corners.max(axis=0), self.spacing
-        )
+        return _cut(lambda p: _inside_polygon(p, corners), corners.min(axis=0), corners.max(axis=0), self.spacing)
 
 
 @dataclass(frozen=True)
@@ -166,9 +164,7 @@ class Mapped(Shape):
 
     def lattice(self) -> Lattice:
         start = self.shape.lattice()
-        lattice = start.with_nodes(
-            field_of_position("mapped.function", self.function, start.nodes, start.dim)
-        )
+        lattice = start.with_nodes(field_of_position("mapped.function", self.function, start.nodes, start.dim))
         if lattice.cell_volumes().min() <= 0.0:
             raise SceneError(
                 "mapped.function", self.function, "it must keep every cell's volume positive (no folds)"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 import tempfile
 
@@ -17,7 +19,8 @@ def start_warp() -> None:
     else:
         wp.config.quiet = True
     try:
-        wp.init()
+        with _without_driver_notice():
+            wp.init()
     except OSError as error:
         folder = tempfile.mkdtemp(prefix="warpsph-kernels-")
         print(
@@ -27,6 +30,27 @@ def start_warp() -> None:
         )
         wp.config.kernel_cache_dir = folder
         wp.init()
+
+
+@contextlib.contextmanager
+def _without_driver_notice():
+    """Drops the line that Warp's native code prints where there is no CUDA driver; passes on all others."""
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as caught:
+        try:
+            original = os.dup(2)
+        except OSError:  # no standard error at all
+            yield
+            return
+        os.dup2(caught.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(original, 2)
+            os.close(original)
+            caught.seek(0)
+            lines = caught.read().decode(errors="replace").splitlines(keepends=True)
+            sys.stderr.write("".join(line for line in lines if "CUDA driver" not in line))
 
 
 def choose_device(name: str | None) -> wp.Device:

@@ -75,9 +75,7 @@ FIELDS: dict[str, Field] = {
     "displacement": Field("m", "(n, d)", "u = x − X", lambda s: s.nodes.displacement.numpy().copy()),
     "velocity": Field("m/s", "(n, d)", "velocity v", lambda s: _phi(s)[:, : s.lattice.dim].copy()),
     "stress": Field("Pa", "(n, s)", "Cauchy stress σ, stored components, tension positive", _stress),
-    "von_mises_stress": Field(
-        "Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.lattice.continuum)
-    ),
+    "von_mises_stress": Field("Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.lattice.continuum)),
     "mean_stress": Field(
         "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.lattice.continuum)
     ),

@@ -39,9 +39,7 @@ def time_step_limit(scene: Scene) -> float:
     limit = courant_limit(scene)
     if numerics.time_step is not None:
         if numerics.time_step > limit * per_courant * (1.0 + ROUNDING):
-            raise SceneError(
-                "time_step", numerics.time_step, f"it must be at most {limit * per_courant:.6g} s"
-            )
+            raise SceneError("time_step", numerics.time_step, f"it must be at most {limit * per_courant:.6g} s")
         return numerics.time_step
     if numerics.courant > limit * (1.0 + ROUNDING):
         raise SceneError(

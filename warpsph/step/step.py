@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import load_kernels
 from ..ground.materials import law as material_law
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
@@ -50,19 +51,15 @@ class Stepper:
         self.auxiliary = auxiliary_nodes(scene, types, precision, device)
         self.history = material_history(n, law, precision, device)
         self._device, self._n, self._m = device, n, len(lattice.cells)
-        wp.launch(centre_kernel(continuum, precision), self._m, [self.nodes, self.auxiliary], device=device)
 
         support, skin = KERNELS[numerics.kernel].support, 0.0
         self._motion = NoMotion()
         if scene.large_displacements:
             skin = SKIN * lattice.spacing
             self._motion = Motion(n, support, skin, scene.material.density, continuum, precision, device)
-        lists = (continuum, precision), (support, lattice.spacing, skin)
-        self._around_auxiliary = Neighbours(*lists[0], self.auxiliary, self.nodes, *lists[1])
-        self._around_nodes = Neighbours(*lists[0], self.nodes, self.auxiliary, *lists[1])
-        self.list_builds = 0
-        self._build_lists()
-
+        search = (support, lattice.spacing, skin)
+        self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
+        self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
         self._sources = SOURCE_SCHEMES[numerics.source_scheme](scene, law, self._parameters, precision)
         self._conditions = Conditions(scene.boundary, n, continuum, precision, device)
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
@@ -70,8 +67,15 @@ class Stepper:
             continuum, precision, numerics.kernel, law.Parameters, numerics.velocity_scheme
         )
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
+        parts = (self._around_nodes, self._sources, self._conditions, self._motion)
+        own = (centre_kernel(continuum, precision), self._to_auxiliary, self._to_nodes)
+        load_kernels([*own, *(kernel for part in parts for kernel in part.kernels)], device)
+
+        wp.launch(centre_kernel(continuum, precision), self._m, [self.nodes, self.auxiliary], device=device)
+        self.list_builds = 0
+        self._build_lists()
         self._conditions.apply(self.nodes, 0.0, 0, self._health)
-        self._initial_spin(scene, continuum, precision)
+        self._initial_spin(scene)
 
     def step(self, number: int, t: float, dt: float) -> None:
         """Advance the nodes from t to t + dt; the numbers are those of METHOD section 3.
@@ -127,7 +131,7 @@ class Stepper:
         self._motion.mark(self.nodes)
         self.list_builds += 1
 
-    def _initial_spin(self, scene: Scene, continuum: Continuum, precision: Precision) -> None:
+    def _initial_spin(self, scene: Scene) -> None:
         """Velocity gradient of the initial state, for the spin of the very first source step."""
         if not scene.initial_velocity.any():
             return

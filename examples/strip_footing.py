@@ -1,0 +1,95 @@
+"""Shallow stratum under a wide strip footing: bearing capacity (Blanc and Pastor 2012, section 6.6).
+
+Half of a stratum 14 m wide and 3 m deep under a smooth rigid footing 2 m wide, plane strain, von Mises. The
+footing is pressed down with a velocity that grows linearly. Exact limit load of the whole footing, rate
+independent: (2 + π) b Y0/√3 = 89.06 kN/m. The published velocity step filters least at the largest step, hence
+Courant number 1.
+"""
+
+import math
+
+import numpy as np
+
+from warpsph import (
+    Box,
+    Check,
+    EdgeForce,
+    Fixed,
+    Free,
+    Linear,
+    Output,
+    Parameter,
+    PerzynaVonMises,
+    PrescribedVelocity,
+    Probe,
+    Roller,
+    Scene,
+    edge,
+    where,
+)
+
+HALF_WIDTH = 1.0  # of the footing [m]
+SIZE = (7.0, 3.0)
+
+NUMERICS = {"courant": 1.0}
+PARAMETERS = (
+    Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),
+    Parameter("acceleration", 3e-3, "m/s²", "rate at which the footing's velocity grows"),
+    Parameter("duration", 3.2, "s", "simulated time"),
+    Parameter("young_modulus", 2.5e7, "Pa", "Young's modulus"),
+    Parameter("poisson_ratio", 0.4, "-", "Poisson's ratio"),
+    Parameter("density", 2000.0, "kg/m³", "density"),
+    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
+    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
+    Parameter("yield_size", 15e3, "Pa", "initial size of the von Mises surface Y0"),
+    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
+)
+
+
+def limit_load(p):
+    """Prandtl's limit load of the whole footing [N per metre]."""
+    return (2.0 + math.pi) * 2.0 * HALF_WIDTH * p.yield_size / math.sqrt(3.0)
+
+
+def scene(p):
+    footing = edge("top") & where(lambda x, y: x <= HALF_WIDTH)
+    beside = edge("top") & where(lambda x, y: x > HALF_WIDTH)
+    half_load = EdgeForce(footing, axis=1)
+    return Scene(
+        shape=Box(SIZE, p.spacing),
+        material=PerzynaVonMises(
+            young_modulus=p.young_modulus,
+            poisson_ratio=p.poisson_ratio,
+            density=p.density,
+            fluidity=p.fluidity,
+            exponent=p.exponent,
+            yield_size=p.yield_size,
+            hardening=p.hardening,
+        ),
+        conditions=[
+            Roller(edge("left")),
+            Roller(edge("right")),
+            Fixed(edge("bottom")),
+            PrescribedVelocity(footing, (None, Linear(-p.acceleration))),
+            Free(beside),
+        ],
+        duration=p.duration,
+        numerics=p.numerics,
+        output=Output(
+            probes=(
+                Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node((0.0, SIZE[1])), 1]),
+                Probe("load", "N", lambda s: 2.0 * half_load(s)),
+            ),
+            curve=("settlement", "load"),
+            curve_reference=("exact limit load", limit_load(p)),
+            field="equivalent_plastic_strain",
+        ),
+    )
+
+
+def checks(run):
+    """The mean load once the mechanism has formed: settlements from 9 mm on (t ≥ 2.45 s)."""
+    load, settlement = run.history["load"], run.history["settlement"]
+    plateau = settlement >= 0.6 * settlement[-1]
+    value = float(np.mean(load[plateau]))
+    return [Check("limit_load", value, limit_load(run.parameters), "N", bound=0.03)]

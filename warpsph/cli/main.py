@@ -1,0 +1,96 @@
+"""The command `warpsph`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .. import __version__
+from ..errors import SceneError
+from ..ground.precision import PRECISIONS
+from ..scene.validate import number
+from .catalogue import load, shipped
+from .runner import run
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; the exit status is 0 for success, 1 for a failed check or run, 2 for bad input."""
+    options = _parser().parse_args(arguments)
+    try:
+        return options.command(options)
+    except SceneError as error:
+        print(f"warpsph: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:  # the reader of our output has gone, e.g. `warpsph list | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="warpsph", description="Solid and soil dynamics at large deformations by Runge-Kutta Taylor SPH."
+    )
+    parser.add_argument("--version", action="version", version=f"warpsph {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    listing = commands.add_parser("list", help="list the shipped scenes, or the parameters of one")
+    listing.add_argument("scene", nargs="?", help="a shipped scene or the path of a scene file")
+    listing.set_defaults(command=_list)
+
+    running = commands.add_parser("run", help="run a scene and judge it")
+    running.add_argument("scene", help="a shipped scene or the path of a scene file")
+    running.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter; may be repeated"
+    )
+    running.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
+    running.add_argument("--precision", default="float64", help=f"{' or '.join(PRECISIONS)} (default: float64)")
+    running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
+    running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
+    running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
+    running.set_defaults(command=_run)
+    return parser
+
+
+def _list(options: argparse.Namespace) -> int:
+    if options.scene is None:
+        files = {name: load(name) for name in shipped()}
+        width = max(map(len, files), default=0)
+        for name, file in files.items():
+            print(f"{name.ljust(width)}  {file.description}")
+        return 0
+    file = load(options.scene)
+    print(f"{file.name}: {file.description}\n")
+    rows = [(p.name, "auto" if p.default is None else str(p.default), p.unit, p.meaning) for p in file.parameters]
+    widths = [max(len(row[k]) for row in rows) for k in range(3)]
+    for row in rows:
+        print("  ".join(cell.ljust(w) for cell, w in zip(row, [*widths, 0], strict=True)).rstrip())
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    until = None
+    if options.until is not None:
+        try:
+            until = number("--until", float(options.until), above=0.0)
+        except ValueError:
+            raise SceneError("--until", options.until, "it must be a number above 0 [s]") from None
+    file = load(options.scene)
+    scene, values = file.build(options.set)
+    passed = run(
+        file,
+        scene,
+        values,
+        device=options.device,
+        precision=options.precision,
+        until=until,
+        folder=Path(options.out or Path("runs") / file.name),
+        quiet=options.quiet,
+    )
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

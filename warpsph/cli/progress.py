@@ -1,0 +1,42 @@
+"""The progress bar of a run: simulated time, step rate, remaining time."""
+
+from __future__ import annotations
+
+from tqdm import tqdm
+
+from ..simulation.simulation import Simulation
+
+
+class Progress:
+    """An observer that shows a bar on a terminal, and nothing elsewhere.
+
+    Args:
+        simulation: the simulation.
+        end: simulated time at which the run ends [s].
+        show: whether to show the bar at all.
+    """
+
+    def __init__(self, simulation: Simulation, end: float, show: bool):
+        self._bar = tqdm(
+            total=end,
+            initial=simulation.time,
+            disable=not show,
+            leave=False,
+            mininterval=0.2,
+            bar_format="{percentage:3.0f}%|{bar}| t = {n:.4g}/{total:.4g} s, {elapsed}<{remaining}{postfix}",
+        )
+        self._first_step = simulation.steps
+
+    def observe(self, simulation: Simulation) -> None:
+        """Move the bar."""
+        if self._bar.disable:
+            return
+        elapsed = self._bar.format_dict["elapsed"]
+        if elapsed > 0.0:
+            rate = (simulation.steps - self._first_step) / elapsed
+            self._bar.set_postfix_str(f"{rate:.0f} steps/s", refresh=False)
+        self._bar.update(min(simulation.time, self._bar.total) - self._bar.n)
+
+    def close(self) -> None:
+        """Remove the bar."""
+        self._bar.close()

@@ -1,0 +1,114 @@
+"""Runs one scene file: progress, history, checks, pictures, summary."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+
+from .. import __version__
+from ..errors import NonFiniteError, SceneError
+from ..scene.check import Check
+from ..scene.scene import Scene
+from ..simulation.history import History
+from ..simulation.plots import plot_field, plot_history
+from ..simulation.simulation import Simulation
+from ..simulation.summary import summarise, write_json
+from .catalogue import SceneFile
+from .progress import Progress
+
+
+def run(
+    file: SceneFile,
+    scene: Scene,
+    parameters: Mapping[str, object],
+    *,
+    device: str | None,
+    precision: str,
+    until: float | None,
+    folder: Path,
+    quiet: bool,
+) -> bool:
+    """Run a scene and write its results into a folder; True when it finished and all checks passed."""
+    say = (lambda text: None) if quiet else print
+    folder = _writable(folder)
+    start = clock.perf_counter()
+    simulation = Simulation(scene, device=device, precision=precision)
+    say(
+        f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
+        f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
+        f"(ready after {clock.perf_counter() - start:.1f} s)"
+    )
+    end = scene.duration if until is None else until
+    history = History(simulation, folder / "history.csv")
+    progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
+    begin, error = clock.perf_counter(), None
+    try:
+        simulation.run(until=end, observers=[history, progress])
+        history.sample(simulation)
+    except NonFiniteError as failure:
+        error = str(failure)
+    finally:
+        progress.close()
+        history.close()
+    wall_time = clock.perf_counter() - begin
+    checks: list[Check] = []
+    finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
+    if finished:
+        outcome = SimpleNamespace(
+            simulation=simulation, scene=scene, history=history, parameters=SimpleNamespace(**parameters)
+        )
+        checks = file.checks(outcome)
+    summary = summarise(simulation, parameters, checks, wall_time, __version__, error)
+    write_json(folder / "summary.json", summary)
+    pictures = []
+    if plot_history(simulation, history, folder / "history.png"):
+        pictures.append("history.png")
+    if error is None:
+        plot_field(simulation, folder / "field.png")
+        pictures.append("field.png")
+    say(
+        f"{simulation.steps} steps to t = {simulation.time:.6g} s in {wall_time:.1f} s, "
+        f"{summary['node_steps_per_second']:.3g} node-steps/s"
+    )
+    if error:
+        print(f"warpsph: {error}", file=sys.stderr)
+    elif not finished:
+        say(f"checks skipped: they need the whole duration of {scene.duration:g} s")
+    passed = error is None and all(check.passed for check in checks)
+    if checks and not (quiet and passed):
+        print(table(checks))
+    say(f"results in {folder}/: summary.json, history.csv, {', '.join(pictures)}")
+    return passed
+
+
+def table(checks: Sequence[Check]) -> str:
+    """The checks as aligned text."""
+    rows = [("check", "value", "reference", "unit", "error", "bound", "")]
+    for check in checks:
+        error, bound = (
+            (f"{100 * check.error:.3g} %", f"{100 * check.bound:.3g} %")
+            if check.relative
+            else (f"{check.error:.3g}", f"{check.bound:.3g}")
+        )
+        verdict = "passed" if check.passed else "FAILED"
+        rows.append(
+            (check.name, f"{check.value:.6g}", f"{check.reference:.6g}", check.unit, error, bound, verdict)
+        )
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def _writable(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".warpsph"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SceneError("--out", str(folder), f"it must be a folder that can be written ({error})") from None
+    return folder

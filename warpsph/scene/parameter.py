@@ -1,0 +1,97 @@
+"""Parameters of a shipped or user-written scene file: what `--set name=value` may change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+from ..errors import SceneError, one_of
+from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a scene file.
+
+    Args:
+        name: its name.
+        default: its default; its type (float, int, bool or str) is the type of every value. None stands for
+            "chosen by warpsph" and takes numbers.
+        unit: its unit, `-` for none.
+        meaning: one line.
+        choices: the allowed values, if only some are.
+    """
+
+    name: str
+    default: float | int | bool | str | None
+    unit: str
+    meaning: str
+    choices: tuple[str, ...] = ()
+
+    def parse(self, text: object) -> float | int | bool | str | None:
+        """The value a command line gives."""
+        value = str(text).strip()
+        if self.choices and value not in self.choices:
+            raise SceneError(self.name, value, one_of(self.choices, value))
+        try:
+            if isinstance(self.default, bool):
+                return {"true": True, "false": False, "1": True, "0": False}[value.lower()]
+            if self.default is None:
+                return None if value.lower() in ("auto", "none") else float(value)
+            return type(self.default)(value)
+        except (KeyError, ValueError):
+            kind = {bool: "true or false", int: "a whole number", float: "a number"}
+            allowed = kind.get(type(self.default), "a number or auto")
+            raise SceneError(self.name, value, f"it must be {allowed}") from None
+
+
+def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...]:
+    """The parameters every scene takes, with a scene's own defaults where it has any."""
+    standard = {
+        "smoothing_ratio": (None, "-", "smoothing length over spacing h/Δx; auto is the kernel's own default", ()),
+        "courant": (0.9, "-", "c_p Δt/Δx, c_p the fastest wave's speed", ()),
+        "kernel": ("gaussian", "-", f"smoothing function: {', '.join(KERNELS)}", tuple(KERNELS)),
+        "velocity_scheme": (
+            "blanc-pastor",
+            "-",
+            f"velocity step: {', '.join(VELOCITY_SCHEMES)}",
+            VELOCITY_SCHEMES,
+        ),
+        "source_scheme": ("rk4", "-", f"sources: {', '.join(SOURCE_SCHEMES)}", SOURCE_SCHEMES),
+        "time_step": (None, "s", "Δt; auto follows from courant and the stiffness of the sources", ()),
+    }
+    for name in defaults:
+        if name not in standard:
+            raise SceneError("NUMERICS", name, one_of(standard, name))
+    return tuple(
+        Parameter(name, defaults.get(name, default), unit, meaning, choices)
+        for name, (default, unit, meaning, choices) in standard.items()
+    )
+
+
+def assign(parameters: Iterable[Parameter], settings: Iterable[str]) -> dict[str, object]:
+    """Values of all parameters, after settings of the form `name=value`.
+
+    Changing the kernel also resets a smoothing ratio that was meant for the scene's default kernel.
+    """
+    by_name = {parameter.name: parameter for parameter in parameters}
+    values = {name: parameter.default for name, parameter in by_name.items()}
+    given = {}
+    for setting in settings:
+        name, separator, text = setting.partition("=")
+        name = name.strip()
+        if not separator:
+            raise SceneError("--set", setting, "it must have the form name=value")
+        if name not in by_name:
+            raise SceneError("--set", name, one_of(by_name, name))
+        given[name] = by_name[name].parse(text)
+    if given.get("kernel", values["kernel"]) != values["kernel"]:
+        values["smoothing_ratio"] = None
+    return values | given
+
+
+def namespace(values: Mapping[str, object]) -> SimpleNamespace:
+    """The values as attributes, with the numerical ones collected in `numerics`."""
+    numerical = {name: values[name] for name in Numerics.__dataclass_fields__}
+    return SimpleNamespace(**values, numerics=Numerics(**numerical))

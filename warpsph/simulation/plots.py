@@ -1,0 +1,124 @@
+"""Pictures of a run: the history curve and the final field, with matplotlib and without a screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from .fields import FIELDS
+from .history import History
+from .simulation import Simulation
+
+COLOUR_MAP = "cividis"  # readable with every common colour-vision deficiency, and in grey
+DOTS_PER_INCH = 150
+
+
+def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
+    """Draw the scene's curve into a PNG; False when the scene records nothing to draw."""
+    output = simulation.scene.output
+    if not output.probes:
+        return False
+    x_name, y_name = output.curve or ("time", output.probes[0].name)
+    figure, axes = _figure((7.0, 4.5))
+    x, y = history[x_name], history[y_name]
+    axes.plot(x, y, color="#00204d", linewidth=1.5, label="warpsph")
+    if output.curve_reference:
+        label, value = output.curve_reference
+        axes.axhline(value, color="#c26a00", linestyle="--", linewidth=1.2, label=f"{label}: {value:.5g}")
+        axes.legend(loc="best", frameon=False)
+    axes.set_xlabel(_label(x_name, history.unit(x_name)))
+    axes.set_ylabel(_label(y_name, history.unit(y_name)))
+    axes.set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
+    axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    return True
+
+
+def plot_field(simulation: Simulation, path: Path) -> None:
+    """Draw the scene's field at the present time, on the deformed nodes, into a PNG."""
+    output, lattice = simulation.scene.output, simulation.lattice
+    values = simulation.field(output.field)
+    name = output.field
+    if values.ndim > 1:
+        values = values[:, output.component]
+        name = f"{name} {_component(output.field, output.component, lattice.continuum)}"
+    position = simulation.field("position")
+    label = _label(name, FIELDS[output.field].unit)
+    draw = {1: _line, 2: _cells, 3: _surface}[lattice.dim]
+    figure = draw(position, values, lattice, label)
+    figure.axes[0].set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
+    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+
+
+def _line(position, values, lattice, label) -> Figure:
+    figure, axes = _figure((7.0, 4.0))
+    axes.plot(position[:, 0], values, color="#00204d", linewidth=1.2, marker=".", markersize=3)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+    return figure
+
+
+def _cells(position, values, lattice, label) -> Figure:
+    """Cells of the initial lattice, where they are now, with the nodes' values between them.
+
+    Colours span the middle 99 % of the values: a single node at a footing's edge would hide all others.
+    """
+    extent = np.ptp(position, axis=0)
+    wide = extent[0] > 1.5 * extent[1]
+    figure, axes = _figure((8.0, 2.0 + 7.0 * extent[1] / extent[0]) if wide else (7.5, 6.5))
+    a, b, c, d = lattice.cells.T
+    triangles = np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
+    low, high = np.percentile(values, [0.5, 99.5])
+    beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    colours = axes.tripcolor(
+        *position.T, triangles, values, shading="gouraud", cmap=COLOUR_MAP, vmin=low, vmax=high, rasterized=True
+    )
+    outline = PolyCollection(position[lattice.faces], edgecolor="black", facecolor="none", linewidth=0.6)
+    axes.add_collection(outline)
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    figure.colorbar(
+        colours,
+        ax=axes,
+        label=label,
+        extend=beyond[bool(values.min() < low), bool(values.max() > high)],
+        location="bottom" if wide else "right",
+        shrink=0.8,
+        aspect=30,
+    )
+    return figure
+
+
+def _surface(position, values, lattice, label) -> Figure:
+    figure = Figure(figsize=(7.0, 6.0))
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(projection="3d")
+    nodes = np.unique(lattice.faces)
+    points = axes.scatter(*position[nodes].T, c=values[nodes], cmap=COLOUR_MAP, s=8)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.set_zlabel("z [m]")
+    axes.set_aspect("equal")
+    figure.colorbar(points, ax=axes, label=label, shrink=0.7)
+    return figure
+
+
+def _figure(size):
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.add_subplot()
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name.replace('_', ' ')} [{unit}]"
+
+
+def _component(field: str, component: int, continuum) -> str:
+    return continuum.stress_components[component] if field == "stress" else continuum.axes[component]
