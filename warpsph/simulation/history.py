@@ -30,7 +30,7 @@ class History:
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
         self._rows: list[list[float]] = []
         self._next = 0.0
-        self._file = None if path is None else open(path, "w", newline="", encoding="utf-8")
+        self._file = path.open("w", newline="", encoding="utf-8") if path else None
         self._writer = None if self._file is None else csv.writer(self._file)
         if self._writer:
             self._writer.writerow(f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True))

@@ -16,7 +16,7 @@ from ..nodes.node_sets import (
     node_types,
 )
 from ..operators.conditions import Conditions, condition_types
-from ..operators.motion import Motion, NoMotion, centre_kernel
+from ..operators.motion import Motion, NoMotion, centre_kernel, half_step_gradient, initial_gradient
 from ..operators.sources import SOURCE_SCHEMES
 from ..operators.sweep import sweep
 from ..operators.waves import wave_rate
@@ -64,7 +64,12 @@ class Stepper:
         self._conditions = Conditions(scene.boundary, n, continuum, precision, device)
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
-            continuum, precision, numerics.kernel, law.Parameters, numerics.velocity_scheme
+            continuum,
+            precision,
+            numerics.kernel,
+            law.Parameters,
+            numerics.velocity_scheme,
+            scene.large_displacements,
         )
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
         parts = (self._around_nodes, self._sources, self._conditions, self._motion)
@@ -168,7 +173,9 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 
 
 @cache
-def _to_nodes_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type, scheme: str):
+def _to_nodes_kernel(
+    continuum: Continuum, precision: Precision, kernel: str, Parameters: type, scheme: str, moves: bool
+):
     types, conditions = node_types(continuum, precision), condition_types(continuum, precision)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
     phi = unknowns(continuum, precision)
@@ -177,6 +184,7 @@ def _to_nodes_kernel(continuum: Continuum, precision: Precision, kernel: str, Pa
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
+    to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_nodes(
@@ -191,8 +199,8 @@ def _to_nodes_kernel(continuum: Continuum, precision: Precision, kernel: str, Pa
         point = nodes.point[i]
         sums = collect(i, point.x, nodes.smoothing_length[i], point.phi, pairs, auxiliary.point)
         phi_half = apply(i, value(sums), conditions)  # 7
-        grad = gradient(sums, phi_half)
-        minus_div_f = rate(grad, real(1.0) / nodes.density[i], material)  # 8-9
+        grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
+        minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 
         v_half = velocity(phi_half)
         sigma_adv = stress(point.phi) + dt * stress(minus_div_f)  # 10a
