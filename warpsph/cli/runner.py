@@ -95,9 +95,9 @@ def table(checks: Sequence[Check]) -> str:
     rows = [("check", "value", "reference", "unit", "error", "bound", "")]
     for check in checks:
         error, bound = (
-            (f"{100 * check.error:.3g} %", f"{100 * check.bound:.3g} %")
+            (f"{100 * check.error:.3g} %", f"{100 * check.applied_bound:.3g} %")
             if check.relative
-            else (f"{check.error:.3g}", f"{check.bound:.3g}")
+            else (f"{check.error:.3g}", f"{check.applied_bound:.3g}")
         )
         verdict = "passed" if check.passed else "FAILED"
         rows.append(
