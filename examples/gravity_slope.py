@@ -1,8 +1,9 @@
 """Slope of very low cohesion that flows under gravity (Blanc and Pastor 2012, section 6.4).
 
-A vertical slope 4 m long and 2 m high, plane strain, Perzyna and von Mises with Y0 = 2 kPa. Gravity grows over 1 s,
-a damping −50 v stands for the paper's artificial viscosity. For 35 s the soil flows out to the right like a viscous
-fluid. The paper's toe moved 1.5 m; the run-out depends on the damping and on the time step, and is reported, not tuned.
+A vertical slope 4 m long and 2 m high, plane strain, Perzyna and von Mises with Y0 = 2 kPa. Gravity grows over
+1 s, a damping −50 v stands for the paper's artificial viscosity. For 35 s the soil flows out to the right like a
+viscous fluid. The paper's toe moved 1.5 m; the run-out depends on the damping and on the time step, and is
+reported, not tuned.
 """
 
 import numpy as np

@@ -2,7 +2,8 @@
 
 A block 0.2 m wide and 1 m high hangs from its fixed top and gravity acts from t = 0 on. With the complete scheme
 (`--set velocity_scheme=taylor`) a checkerboard grows in the vertical velocity; with the published velocity step
-there is none. The paper gives neither material nor spacing: those of its slope and a spacing of 0.05 m are our choice.
+there is none. The paper gives neither material nor spacing: those of its slope and a spacing of 0.05 m are our
+choice.
 """
 
 import numpy as np

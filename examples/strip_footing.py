@@ -34,10 +34,11 @@ from warpsph import (
 HALF_WIDTH = 1.0  # of the footing [m]
 SIZE = (7.0, 3.0)
 EDGE = (HALF_WIDTH, SIZE[1])  # of the footing; the curved band turns about it
-# Rays from there on which the curved band is looked for: from the first past the axis of symmetry to the surface [°],
-# far enough out [m] not to find the crushed soil at the edge itself.
-RAYS = np.arange(-120.0, 0.1, 2.5)
+# Rays from there on which the curved band is looked for [°]: from near the axis of symmetry to the surface, where
+# one that grazes the edge nodes is left out; far enough out [m] not to find the crushed soil at the edge itself.
+RAYS = np.append(np.arange(-115.0, -4.9, 2.5), 0.0)
 NEAREST, FARTHEST = 1.2, 3.0
+SMOOTHING = 0.3  # of the strain along a ray [m]
 
 NUMERICS = {"courant": 1.0}
 PARAMETERS = (
@@ -97,11 +98,9 @@ def scene(p):
     )
 
 
-def second_band(simulation):
-    """The curved band: where ε̄ is largest on each ray from the footing's edge, in initial positions."""
-    lattice = simulation.lattice
-    sample = Sampler(lattice.nodes, lattice.cells, simulation.field("equivalent_plastic_strain"))
-    return trace_ridge(sample, EDGE, RAYS, NEAREST, FARTHEST)
+def second_band(lattice, strain):
+    """The curved band: where ε̄ (n,) is largest on each ray from the footing's edge, in initial positions."""
+    return trace_ridge(Sampler(lattice.nodes, lattice.cells, strain), EDGE, RAYS, NEAREST, FARTHEST, SMOOTHING)
 
 
 def checks(run):
@@ -111,7 +110,7 @@ def checks(run):
     falls instead, towards the residual strength.
     """
     p, load, settlement = run.parameters, run.history["load"], run.history["settlement"]
-    strain = second_band(run.simulation).strain
+    strain = second_band(run.simulation.lattice, run.simulation.field("equivalent_plastic_strain")).strain
     median = float(np.median(strain))
     reaches = Check("second_band_weakest", float(strain.min()), median, "-", bound=0.75)
     if p.hardening < 0.0:

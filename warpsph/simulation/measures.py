@@ -36,10 +36,19 @@ def checkerboard_amplitude(lattice: Lattice, values: np.ndarray) -> float:
 
 
 def smallest_distance(points: np.ndarray) -> float:
-    """Distance of the two nearest of n points [m]; what tensile clumping drives to zero. Takes O(n²) memory."""
-    squares = np.sum((points[:, None] - points[None]) ** 2, axis=2)
-    squares[np.diag_indices(len(points))] = np.inf
-    return float(np.sqrt(squares.min()))
+    """Distance of the two nearest of n points [m], shape (n, d): what tensile clumping drives to zero.
+
+    >>> smallest_distance(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 6.0]]))
+    2.0
+    """
+    ordered = points[np.argsort(points[:, 0])]
+    smallest = np.inf
+    for k in range(1, len(points)):  # k-th neighbours in x: their gaps in x grow with k
+        gaps = ordered[k:] - ordered[:-k]
+        if gaps[:, 0].min() >= smallest:
+            break
+        smallest = min(smallest, np.linalg.norm(gaps, axis=1).min())
+    return float(smallest)
 
 
 def growth_rate(time: np.ndarray, amplitude: np.ndarray, low: float, high: float) -> float:
@@ -58,22 +67,34 @@ def growth_rate(time: np.ndarray, amplitude: np.ndarray, low: float, high: float
 
 
 class Sampler:
-    """Values of a node field anywhere in a plane body, linear on the two triangles of each cell."""
+    """Values of a node field anywhere in a plane body, linear on the triangles of `split_cells`."""
 
     def __init__(self, points: np.ndarray, cells: np.ndarray, values: np.ndarray):
         from matplotlib.tri import LinearTriInterpolator, Triangulation  # slow to import, and only needed here
 
-        self._interpolate = LinearTriInterpolator(Triangulation(*points.T, triangles(cells)), values)
+        corners, triangles, heights = split_cells(points, cells, values)
+        self._interpolate = LinearTriInterpolator(Triangulation(*corners.T, triangles), heights)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Values at points (…, 2); 0 outside the body."""
         return self._interpolate(points[..., 0], points[..., 1]).filled(0.0)
 
 
-def triangles(cells: np.ndarray) -> np.ndarray:
-    """The two triangles of each cell of a plane lattice, shape (2m, 3)."""
+def split_cells(
+    points: np.ndarray, cells: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cut each cell of a plane lattice into four triangles about its middle, where the value is the mean.
+
+    That is where the auxiliary node stands; cutting along one diagonal would draw a checkerboard as stripes.
+
+    Returns: corners of the triangles (n + m, 2), triangles (4m, 3), values at the corners (n + m,).
+    """
+    middle = len(points) + np.arange(len(cells))
     a, b, c, d = cells.T
-    return np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
+    sides = ((a, c), (c, d), (d, b), (b, a))
+    triangles = np.concatenate([np.stack([middle, first, second], axis=1) for first, second in sides])
+    corners = np.concatenate([points, points[cells].mean(axis=1)])
+    return corners, triangles, np.concatenate([values, values[cells].mean(axis=1)])
 
 
 @dataclass(frozen=True)
@@ -161,7 +182,12 @@ class Ridge:
 
 
 def trace_ridge(
-    sample: Sampler, centre: tuple[float, float], angles: np.ndarray, nearest: float, farthest: float
+    sample: Sampler,
+    centre: tuple[float, float],
+    angles: np.ndarray,
+    nearest: float,
+    farthest: float,
+    smoothing: float = 0.0,
 ) -> Ridge:
     """Follow a band that curves around a point.
 
@@ -170,11 +196,14 @@ def trace_ridge(
         centre: the point [m].
         angles: of the rays to the x axis [°], in the order in which the band is followed.
         nearest, farthest: the part of each ray that is searched [m].
+        smoothing: length along a ray over which the strain is averaged first [m].
     """
     radii = np.linspace(nearest, farthest, 801)
     rays = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     points = np.asarray(centre) + radii[None, :, None] * rays[:, None, :]
-    strain = sample(points)
+    window = np.ones(1 + 2 * int(0.5 * smoothing / (radii[1] - radii[0])))
+    covered = np.convolve(np.ones(len(radii)), window, mode="same")
+    strain = np.array([np.convolve(along, window, mode="same") / covered for along in sample(points)])
     best = strain.argmax(axis=1)
     row = np.arange(len(angles))
     return Ridge(np.asarray(angles), radii[best], strain[row, best], points[row, best])
