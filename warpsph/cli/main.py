@@ -113,7 +113,11 @@ def _report(options: argparse.Namespace) -> int:
         raise SceneError("--jobs", options.jobs, "it must be at least 1")
     default = Path("runs") / ("report-quick" if options.quick else "report")
     folder = writable(Path(options.out or default))
-    report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
+    try:
+        report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
+    except KeyboardInterrupt:
+        print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
+        return 130
     return 0
 
 

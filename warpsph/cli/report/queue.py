@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import sys
 import time as clock
 from collections.abc import Sequence
@@ -28,11 +29,11 @@ def make_missing(runs: Sequence[Run], folder: Path, device: str | None, jobs: in
         return
     begin, cost = clock.perf_counter(), {run: run.cost() for run in missing}
     show = not quiet and sys.stderr.isatty()
-    form = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining} {postfix}"
+    form = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     with (
         tqdm(total=sum(cost.values()), disable=not show, leave=False, bar_format=form) as bar,
-        ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool,
+        ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_leave_interrupts_to_parent) as pool,
     ):
         pending = {pool.submit(run.make, folder / run.name, device): run for run in missing}
         finished, ready = 0, 0.0
@@ -52,6 +53,12 @@ def make_missing(runs: Sequence[Run], folder: Path, device: str | None, jobs: in
                     bar.set_postfix_str(", ".join(run.name for run in running[:jobs]), refresh=False)
                     bar.n = ready + part
                     bar.refresh()
-        except BaseException:
+        except BaseException:  # an interrupt above all: what runs now is lost, what is done stays
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
             raise
+
+
+def _leave_interrupts_to_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -172,8 +172,8 @@ def _breakdown(finer) -> str:
     return (
         "Finer runs do not last: "
         + "; ".join(words)
-        + ". The footing's edge shears one column of cells, by its settlement over Δx, until the initial cells, "
-        "whose middles are the auxiliary nodes, fold over."
+        + ". The footing's end shears the cell beside it by its settlement over Δx, until that cell, whose middle "
+        "is an auxiliary node, folds over."
     )
 
 
