@@ -34,9 +34,9 @@ def run(
 ) -> bool:
     """Run a scene and write its results into a folder; True when it finished and all checks passed."""
     say = (lambda text: None) if quiet else print
-    folder = _writable(folder)
     start = clock.perf_counter()
     simulation = Simulation(scene, device=device, precision=precision)
+    folder = _writable(folder)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
