@@ -127,29 +127,28 @@ def _project_kernel(continuum: Continuum, precision: Precision):
     types, surface = node_types(continuum, precision), surface_types(continuum, precision)
     real, vector, tensor, dim = precision.real, types.vector, types.tensor, continuum.dim
     Table, Candidates = free_surface_types(continuum, precision).Table, surface.Candidates
-    joined, weights = surface.joined, wendland_c2(precision)
+    on_face, weights = surface.on_face, wendland_c2(precision)
     identity, same_face = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE)
 
     @wp.func
     def faces_of(c: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
         """Normals of the smooth faces that meet at c, not normalised, one a row; zero rows are left."""
-        x, h, n = candidates.point[c].x, candidates.smoothing_length[c], candidates.normal[c]
+        x, h = candidates.point[c].x, candidates.smoothing_length[c]
         faces = tensor()
         count = wp.int32(0)
         for k in range(pairs.start[c], pairs.start[c + 1]):
-            o = row[pairs.index[k]]
-            if o >= 0 and o != c and candidates.exposed[o] == 1 and candidates.sharp[o] == 0:
-                p = (candidates.point[o].x - x) / h
+            o = on_face(c, k, pairs, row, candidates)
+            if o >= 0 and candidates.sharp[o] == 0:
                 normal = candidates.normal[o]
-                if joined(p, n, normal):
-                    face = count
-                    for f in range(count):
-                        if wp.dot(normal, wp.normalize(faces[f])) > real(same_face):
-                            face = f
-                    if face < wp.static(dim):
-                        w, _ = weights(wp.dot(p, p))
-                        faces[face] = faces[face] + w * normal
-                        count = wp.max(count, face + 1)
+                face = count
+                for f in range(count):
+                    if wp.dot(normal, wp.normalize(faces[f])) > real(same_face):
+                        face = f
+                if face < wp.static(dim):
+                    p = (candidates.point[o].x - x) / h
+                    w, _ = weights(wp.dot(p, p))
+                    faces[face] = faces[face] + w * normal
+                    count = wp.max(count, face + 1)
         if count == 0:
             faces[0] = candidates.normal[c]
         return faces
@@ -171,11 +170,10 @@ def _project_kernel(continuum: Continuum, precision: Precision):
         if wall >= 0:
             unmoved = table.conditions.velocity_projector[wall]
         projector = identity
-        if candidates.exposed[c] == 1:
-            faces = tensor()
-            faces[0] = candidates.normal[c]
-            if candidates.sharp[c] == 1:
-                faces = faces_of(c, pairs, table.row, candidates)
+        if candidates.exposed[c] == 1 and candidates.sharp[c] == 0:
+            projector = without(projector, unmoved * candidates.normal[c])
+        elif candidates.exposed[c] == 1:
+            faces = faces_of(c, pairs, table.row, candidates)
             mean = vector()
             for f in range(wp.static(dim)):
                 face = wp.normalize(faces[f])

@@ -38,10 +38,13 @@ SCAN_SUPPORT = 2.0
 SUPPORT_SQUARED = SCAN_SUPPORT**2
 # A node on the very edge of the scan region is inside, whatever its last bits say.
 SCAN_EDGE = 1.0 + 1e-4
-# Neighbours whose normals differ by more than this lie on different faces: around a corner, or across a thin body.
+# Two surface nodes lie on one face when the line between them rises by less than this, as a sine, from the plane of
+# one of them, the other possibly on the face's edge. Across a right-angled edge it rises by 27° or more from both.
+# Normals more than a right angle apart belong to the two sides of a thin body.
 FACE_RISE = math.sin(math.radians(15.0))
-HALF_EDGE = math.sin(0.5 * SMOOTH_EDGE_ANGLE)
+# A little less curvature than fits best, lest a single neighbour be all curvature and no direction.
 LESS_CURVATURE = 1.01
+# Shift of the inverse iteration for the least eigenvalue, over the sum of the eigenvalues.
 SHIFT = 1e-4
 
 
@@ -53,11 +56,12 @@ class SurfaceTypes:
         Candidates: struct of arrays, one entry a candidate: `node`, its index; `point`, a copy of the node's;
             `smoothing_length` h_s [m]; `scan_normal`, Marrone's n; `exposed`, 1 where the scan finds nothing;
             `normal`, outward, m or n by the scene's choice; `sharp`, 1 where faces meet at an angle.
-        joined: (p, n_I, n_J) → whether J lies on a face through I.
+        on_face: (candidate, place in its pair list, pairs, row, candidates) → the candidate that stands there, if
+            it is exposed and on a face through the first one; else −1.
     """
 
     Candidates: type
-    joined: wp.Function
+    on_face: wp.Function
 
 
 @cache
@@ -77,12 +81,18 @@ def surface_types(continuum: Continuum, precision: Precision) -> SurfaceTypes:
         sharp: wp.array(dtype=wp.int32)
 
     @wp.func
-    def joined(p: vector, own: vector, other: vector):
-        # On one face p is nearly perpendicular to both normals; from a face to its edge, to the face's own.
+    def on_face(c: int, k: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
+        o = row[pairs.index[k]]
+        if o < 0 or o == c or candidates.exposed[wp.max(o, 0)] == 0:
+            return -1
+        p = candidates.point[o].x - candidates.point[c].x
+        own, other = candidates.scan_normal[c], candidates.scan_normal[o]
         rise = wp.min(wp.abs(wp.dot(p, own)), wp.abs(wp.dot(p, other)))
-        return wp.dot(own, other) > real(0.0) and rise < real(FACE_RISE) * wp.length(p)
+        if wp.dot(own, other) < real(0.0) or rise > real(FACE_RISE) * wp.length(p):
+            return -1
+        return o
 
-    return SurfaceTypes(Candidates, joined)
+    return SurfaceTypes(Candidates, on_face)
 
 
 class SurfaceScan:
@@ -213,10 +223,10 @@ def _fit_kernel(continuum: Continuum, precision: Precision):
     """The kernel that fits normals to the neighbours on the surface."""
     types, surface = node_types(continuum, precision), surface_types(continuum, precision)
     real, vector, tensor = precision.real, types.vector, types.tensor
-    Candidates, joined, weights = surface.Candidates, surface.joined, wendland_c2(precision)
-    # Where two faces meet, directions rise by half the angle between them; along the edge of a solid only those
-    # across it do so fully, 2/π of it in the mean over all directions.
-    sharp_rise = HALF_EDGE * (1.0 if continuum.dim == 2 else 2.0 / math.pi)
+    Candidates, on_face, weights = surface.Candidates, surface.on_face, wendland_c2(precision)
+    # Where two faces meet, all directions rise (or all fall) by half the angle between the faces; in a solid those
+    # across the edge do, 2/π as much in the mean over all directions.
+    sharp_rise = math.sin(0.5 * SMOOTH_EDGE_ANGLE) * (1.0 if continuum.dim == 2 else 2.0 / math.pi)
     identity = tensor(np.eye(continuum.dim))
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -227,21 +237,19 @@ def _fit_kernel(continuum: Continuum, precision: Precision):
         offset = vector()  # Σ w p
         spread, distance = real(0.0), real(0.0)  # Σ w |p|², Σ w |p|
         for k in range(pairs.start[c], pairs.start[c + 1]):
-            o = row[pairs.index[k]]
-            if o >= 0 and o != c and candidates.exposed[o] == 1:
+            o = on_face(c, k, pairs, row, candidates)
+            if o >= 0:
                 p = (candidates.point[o].x - x) / h
                 s = wp.dot(p, p)
-                if s < real(SUPPORT_SQUARED) and joined(p, n, candidates.scan_normal[o]):
-                    w, _ = weights(s)
-                    directions += (w / s) * wp.outer(p, p)
-                    offset += w * p
-                    spread += w * s
-                    distance += w * wp.sqrt(s)
+                w, _ = weights(s)
+                directions += (w / s) * wp.outer(p, p)
+                offset += w * p
+                spread += w * s
+                distance += w * wp.sqrt(s)
         candidates.normal[c] = n
         sharp = wp.abs(wp.dot(n, offset)) > real(sharp_rise) * distance
         if spread > real(0.0) and not sharp:
-            # The minimum over c leaves directions − offset²/spread; a little less of it, lest a single neighbour
-            # be all curvature and no direction. Inverse iteration finds the eigenvector of the least eigenvalue.
+            # The minimum over c leaves directions − offset²/spread, whose least eigenvalue belongs to m.
             flatness = directions - wp.outer(offset, offset) / (real(LESS_CURVATURE) * spread)
             towards = wp.inverse(flatness + real(SHIFT) * wp.trace(directions) * identity)
             candidates.normal[c] = wp.normalize(towards * wp.normalize(towards * n))
