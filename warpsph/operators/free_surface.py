@@ -5,7 +5,9 @@ lie in all of its faces. On a smooth surface P = 1 − n n; along the edge of a 
 edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept.
 
 At the end of a wall a velocity condition beats the traction condition: only the directions that nobody moves are
-freed, so there n stands for its part along them.
+freed, so there n stands for its part along them. Without that a slope's toe would carry the full overburden on its
+free face. Where the surface goes on smoothly from the wall, as beside a footing, the wall's last node lies on one
+face only, the wall's, and nothing is freed.
 """
 
 import math
@@ -29,8 +31,10 @@ from .surface_scan import SurfaceScan, surface_types
 # The surface is found anew once ∫|L| dt since the last time reaches this anywhere on it: the direction from one
 # node to the next, and with it a normal, turns by no more than that.
 LARGEST_TURN = math.radians(1.0)
-# A face whose free part is this small, as a sine, is parallel to a wall or to a face already freed.
+# A face with less than this left of its normal, as a sine, is parallel to a wall or to a face already freed.
 PARALLEL = 0.1
+# At the end of a wall the scan's normal stands halfway between those of the wall and the free surface.
+HALF_EDGE = 0.5 * SMOOTH_EDGE_ANGLE
 
 
 class FreeSurfaceConditions(Conditions):
@@ -128,7 +132,7 @@ def _project_kernel(continuum: Continuum, precision: Precision):
     real, vector, tensor, dim = precision.real, types.vector, types.tensor, continuum.dim
     Table, Candidates = free_surface_types(continuum, precision).Table, surface.Candidates
     on_face, weights = surface.on_face, wendland_c2(precision)
-    identity, same_face = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE)
+    identity, same_face, smooth = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE), math.cos(HALF_EDGE)
 
     @wp.func
     def faces_of(c: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
@@ -162,23 +166,29 @@ def _project_kernel(continuum: Continuum, precision: Precision):
             return projector - wp.outer(unit, unit)
         return projector
 
+    @wp.func
+    def freed_part(face: vector, c: int, candidates: Candidates, table: Table):
+        """The part of a face's normal along the directions in which its traction must vanish."""
+        wall = table.conditions.row[candidates.node[c]]
+        if wall < 0:
+            return face
+        if wp.dot(candidates.scan_normal[c], face) > real(smooth):
+            return vector()
+        return table.conditions.velocity_projector[wall] * face
+
     @wp.kernel(module="unique", enable_backward=False)
     def project(pairs: PairList, candidates: Candidates, table: Table):
         c = wp.tid()
-        unmoved = identity
-        wall = table.conditions.row[candidates.node[c]]
-        if wall >= 0:
-            unmoved = table.conditions.velocity_projector[wall]
         projector = identity
         if candidates.exposed[c] == 1 and candidates.sharp[c] == 0:
-            projector = without(projector, unmoved * candidates.normal[c])
+            projector = without(projector, freed_part(candidates.normal[c], c, candidates, table))
         elif candidates.exposed[c] == 1:
             faces = faces_of(c, pairs, table.row, candidates)
             mean = vector()
             for f in range(wp.static(dim)):
                 face = wp.normalize(faces[f])
                 mean += face
-                projector = without(projector, unmoved * face)
+                projector = without(projector, freed_part(face, c, candidates, table))
             candidates.normal[c] = wp.normalize(mean)
         table.projector[c] = projector
 

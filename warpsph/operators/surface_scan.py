@@ -10,10 +10,11 @@ Inside a body Σ V ∇W is nearly zero and n is noise. That does no harm: the re
 0.94 Δx at h_s = 4/3 Δx, more than half the diagonal of a cell (0.71 Δx, 0.87 Δx in 3D), so it holds a node
 wherever n points, also in a lattice stretched by 1.8 (1.5 in 3D).
 
-Improved normals. In the plane the paper takes the mean of the perpendiculars to p = x_J − x, J on the surface. Here
-m is the unit vector most nearly perpendicular to all of them, outward by Marrone's n, in two and three dimensions:
-it minimises Σ w (m·p̂ + c|p|)² over m and c. Without c, and with one neighbour a side, m is the paper's mean; c is
-the curvature, eliminated beforehand, and makes m exact on a circle and a sphere however the nodes stand there.
+Improved normals. In the plane the paper takes the mean of the perpendiculars to p = x_J − x, J on the surface.
+Here m is the unit vector most nearly perpendicular to all of them, outward by Marrone's n, in two and three
+dimensions: it minimises Σ w (m·p̂ + c|p|)² over m and c. Without c, and with one neighbour a side, m is the paper's
+mean; c is half the curvature, and makes m exact on a circle and a sphere however the nodes stand there, where the
+mean errs by the curvature times a quarter of the difference between the two distances.
 """
 
 import math
@@ -38,12 +39,10 @@ SCAN_SUPPORT = 2.0
 SUPPORT_SQUARED = SCAN_SUPPORT**2
 # A node on the very edge of the scan region is inside, whatever its last bits say.
 SCAN_EDGE = 1.0 + 1e-4
-# Two surface nodes lie on one face when the line between them rises by less than this, as a sine, from the plane of
-# one of them, the other possibly on the face's edge. Across a right-angled edge it rises by 27° or more from both.
-# Normals more than a right angle apart belong to the two sides of a thin body.
+# Two surface nodes lie on one face when the line between them rises by less than this, as a sine, from the plane
+# of one of them; the other may be on the face's edge. Across a right-angled edge it rises by 27° or more from
+# both. Normals more than a right angle apart belong to the two sides of a thin body.
 FACE_RISE = math.sin(math.radians(15.0))
-# A little less curvature than fits best, lest a single neighbour be all curvature and no direction.
-LESS_CURVATURE = 1.01
 # Shift of the inverse iteration for the least eigenvalue, over the sum of the eigenvalues.
 SHIFT = 1e-4
 
@@ -185,7 +184,7 @@ def _scan_kernel(continuum: Continuum, precision: Precision):
             r = neighbour.x - x
             s = wp.dot(r, r) / (h * h)
             if s < real(SUPPORT_SQUARED):
-                w, g = weights(s)
+                _, g = weights(s)
                 grad_w = (g * neighbour.volume) * r
                 a += wp.outer(grad_w, r)
                 sum_grad_w += grad_w
@@ -250,7 +249,7 @@ def _fit_kernel(continuum: Continuum, precision: Precision):
         sharp = wp.abs(wp.dot(n, offset)) > real(sharp_rise) * distance
         if spread > real(0.0) and not sharp:
             # The minimum over c leaves directions − offset²/spread, whose least eigenvalue belongs to m.
-            flatness = directions - wp.outer(offset, offset) / (real(LESS_CURVATURE) * spread)
+            flatness = directions - wp.outer(offset, offset) / spread
             towards = wp.inverse(flatness + real(SHIFT) * wp.trace(directions) * identity)
             candidates.normal[c] = wp.normalize(towards * wp.normalize(towards * n))
         candidates.sharp[c] = wp.where(sharp, 1, 0)
