@@ -21,7 +21,7 @@ class SceneError(WarpSPHError, ValueError):
 
     def __init__(self, field: str, value: object, allowed: str):
         self.field, self.value, self.allowed = field, value, allowed
-        super().__init__(f"{field} = {_short(value)} is not allowed: {allowed}")
+        super().__init__(" ".join(f"{field} = {_short(value)} is not allowed: {allowed}".split()))
 
 
 class NonFiniteError(WarpSPHError, ArithmeticError):

@@ -281,7 +281,13 @@ def steps_8_10_advance_at_nodes(
     for I in range(n):
         grad_v = gradient(nodes, I, v_half[I], aux, v_aux_half, model["kernel"])
         grad_sigma = gradient(nodes, I, sigma_half[I], aux, sigma_aux_half, model["kernel"])
-        div_v, div_sigma = div_f(grad_v, grad_sigma, nodes["rho"][I], model)
+        rho = nodes["rho"][I]
+        if not model["small_strain"]:
+            # Fluxes of t^{n+1/2} in the configuration x + dt/2 v^{n+1/2}: chain rule, and its density.
+            half_stretch = np.eye(2) + 0.5 * dt * grad_v
+            grad_v, grad_sigma = grad_v @ np.linalg.inv(half_stretch), grad_sigma @ np.linalg.inv(half_stretch)
+            rho = rho / np.linalg.det(half_stretch)
+        div_v, div_sigma = div_f(grad_v, grad_sigma, rho, model)
         L_new[I] = grad_v
         sigma_adv[I] = sigma_s[I] - dt * div_sigma
         if model["scheme"] == "blanc-pastor":
@@ -335,13 +341,17 @@ def boundary_conditions(v, sigma, t, model):
 
 
 def step_14_move(nodes, v_half, L_new, dt, model):
-    """x <- x + dt v^{n+1/2}, rho <- rho / det(I + dt L); V and h follow rho, auxiliary nodes follow x."""
+    """x <- x + dt v^{n+1/2}, rho <- rho / det(F); V and h follow rho, auxiliary nodes follow x.
+
+    F = I + dt dv/dx with the gradient in the configuration of t^n. L_new is the one in that of the half step,
+    L_new = L_n (I + dt/2 L_n)^-1, hence L_n = (I - dt/2 L_new)^-1 L_new.
+    """
     x, rho = nodes["x"].copy(), nodes["rho"].copy()
     if model["small_strain"]:
         return x, rho
     for I in range(len(x)):
         x[I] = x[I] + dt * v_half[I]
-        F = np.eye(2) + dt * L_new[I]
+        F = np.eye(2) + dt * np.linalg.solve(np.eye(2) - 0.5 * dt * L_new[I], L_new[I])
         rho[I] = rho[I] / (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     return x, rho
 

@@ -12,17 +12,20 @@ and the first line of its docstring describes it.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
-from ..errors import SceneError, one_of
+from ..errors import SceneError, WarpSPHError, one_of
 from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
+from ..scene.validate import instance, listed
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -53,21 +56,43 @@ class SceneFile:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its own parameters, then the numerical ones every scene takes."""
-        own = tuple(getattr(self.module, "PARAMETERS", ()))
-        return own + numerical_parameters(getattr(self.module, "NUMERICS", {}))
+        own = listed("PARAMETERS", getattr(self.module, "PARAMETERS", ()), Parameter, "a sequence of Parameter")
+        parameters = own + numerical_parameters(getattr(self.module, "NUMERICS", {}))
+        names = ["numerics", *(parameter.name for parameter in parameters)]
+        for name in names:
+            if names.count(name) > 1:
+                raise SceneError("PARAMETERS", name, "this name is taken")
+        return parameters
 
     def build(self, settings: Sequence[str]) -> tuple[Scene, dict[str, object]]:
         """The scene with `name=value` settings applied, and the values of its parameters."""
         values = assign(self.parameters, settings)
-        scene = _call(self, "scene", namespace(values))
-        if not isinstance(scene, Scene):
-            raise SceneError(f"{self.name}.scene(p)", scene, "it must return a Scene")
+        with self.blamed():
+            scene = self.module.scene(namespace(values))
+        instance(f"{self.name}.scene(p)", scene, Scene, "a Scene")
         object.__setattr__(scene, "name", self.name)
         return scene, values
 
     def checks(self, run: SimpleNamespace) -> list[Check]:
         """The checks of a finished run."""
-        return list(_call(self, "checks", run)) if hasattr(self.module, "checks") else []
+        if not hasattr(self.module, "checks"):
+            return []
+        with self.blamed():
+            checks = self.module.checks(run)
+        return list(listed(f"{self.name}.checks(run)", checks, Check, "a sequence of Check"))
+
+    @contextlib.contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Turns what a function of the file raises into a `SceneError` that names the line."""
+        try:
+            yield
+        except WarpSPHError:
+            raise
+        except Exception as error:  # a user's function may raise anything
+            path = Path(self.module.__file__)
+            if not _lines(path, error):
+                raise
+            raise _located(path, error) from error
 
 
 def load(name: str) -> SceneFile:
@@ -77,38 +102,32 @@ def load(name: str) -> SceneFile:
         SceneError: there is no such scene, or the file can not be loaded.
     """
     scenes = shipped()
-    path = scenes.get(name, Path(name))
+    path = scenes.get(name, Path(name).absolute())
     if not path.is_file():
         raise SceneError("scene", name, f"{one_of(scenes, name)}, or the path of a scene file")
     spec = importlib.util.spec_from_file_location(f"warpsph_scene_{path.stem}", path)
     if spec is None:
         raise SceneError("scene", name, "the file's name must end in .py")
     module = importlib.util.module_from_spec(spec)
-    file = SceneFile(path.stem, module)
+    sys.modules[spec.name] = module  # dataclasses look their module up there
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
-    return file
-
-
-def _call(file: SceneFile, function: str, argument):
-    try:
-        return getattr(file.module, function)(argument)
-    except SceneError:
-        raise
-    except Exception as error:  # a user's file may raise anything
-        raise _located(Path(file.module.__file__), error) from error
+    return SceneFile(path.stem, module)
 
 
 def _located(path: Path, error: Exception) -> SceneError:
     """The error with the last line of the scene file it passed through."""
     if isinstance(error, SceneError):
         return error
-    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
-    if isinstance(error, SyntaxError):
-        lines = [error.lineno]
+    lines = [error.lineno] if isinstance(error, SyntaxError) else _lines(path, error)
     where = f", line {lines[-1]}" if lines else ""
     return SceneError("scene", str(path), f"the file raised {type(error).__name__}{where}: {error}")
+
+
+def _lines(path: Path, error: Exception) -> list[int]:
+    """The lines of the file that the error passed through."""
+    return [f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]

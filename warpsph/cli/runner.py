@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from .. import __version__
 from ..errors import NonFiniteError, SceneError
 from ..scene.check import Check
+from ..scene.output import component
 from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.plots import plot_field, plot_history
@@ -33,21 +34,24 @@ def run(
 ) -> bool:
     """Run a scene and write its results into a folder; True when it finished and all checks passed."""
     say = (lambda text: None) if quiet else print
-    folder = _writable(folder)
     start = clock.perf_counter()
     simulation = Simulation(scene, device=device, precision=precision)
+    folder = _writable(folder)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )
     end = scene.duration if until is None else until
-    history = History(simulation, folder / "history.csv")
+    component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
+    with file.blamed():
+        history = History(simulation, folder / "history.csv")
     progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
     begin, error = clock.perf_counter(), None
     try:
-        simulation.run(until=end, observers=[history, progress])
-        history.sample(simulation)
+        with file.blamed():
+            simulation.run(until=end, observers=[history, progress])
+            history.sample(simulation)
     except NonFiniteError as failure:
         error = str(failure)
     finally:
@@ -56,13 +60,15 @@ def run(
     wall_time = clock.perf_counter() - begin
     checks: list[Check] = []
     finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
-    if finished:
-        outcome = SimpleNamespace(
-            simulation=simulation, scene=scene, history=history, parameters=SimpleNamespace(**parameters)
-        )
-        checks = file.checks(outcome)
-    summary = summarise(simulation, parameters, checks, wall_time, __version__, error)
-    write_json(folder / "summary.json", summary)
+    try:
+        if finished:
+            outcome = SimpleNamespace(
+                simulation=simulation, scene=scene, history=history, parameters=SimpleNamespace(**parameters)
+            )
+            checks = file.checks(outcome)
+    finally:  # the run keeps its summary when its checks fail to work
+        summary = summarise(simulation, parameters, checks, wall_time, __version__, error)
+        write_json(folder / "summary.json", summary)
     pictures = []
     if plot_history(simulation, history, folder / "history.png"):
         pictures.append("history.png")

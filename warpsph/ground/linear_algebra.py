@@ -1,4 +1,4 @@
-"""Inverse of the small symmetric matrix of the corrected gradient, safe when neighbours are missing."""
+"""Small matrices: the inverse of the corrected gradient's, safe when neighbours are missing; determinants."""
 
 from functools import cache
 
@@ -38,3 +38,18 @@ def symmetric_inverse(dim: int, precision: Precision) -> wp.Function:
             return wp.inverse(n) / scale
 
     return inverse
+
+
+@cache
+def determinant_of(dim: int, precision: Precision) -> wp.Function:
+    """Determinant of a d × d matrix, d = 1 included."""
+    matrix = precision.mat(dim, dim)
+
+    @wp.func
+    def determinant(a: matrix):
+        if wp.static(dim == 1):
+            return a[0, 0]
+        else:
+            return wp.determinant(a)
+
+    return determinant

@@ -22,7 +22,7 @@ from ..scene.scene import Scene
 # RK4 is stable up to 2.785 (METHOD section 3), where it no longer damps at all; half of that follows the
 # exponential to 10 %, and no sub-step overshoots the yield surface.
 STIFFNESS_LIMIT = 1.39
-MOST_SUBSTEPS = 64
+MOST_SUBSTEPS = 256
 
 
 @dataclass(frozen=True)

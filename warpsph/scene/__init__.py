@@ -3,7 +3,7 @@
 from .boundary import BoundaryTable
 from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
-from .dimension import BAR, PLANE_STRAIN, SOLID, Continuum
+from .dimension import BAR, CONTINUA, PLANE_STRAIN, SOLID, Continuum
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .lattice import Lattice
@@ -17,6 +17,7 @@ from .shape import Box, Disc, Mapped, Polygon, Shape
 
 __all__ = [
     "BAR",
+    "CONTINUA",
     "KERNELS",
     "PLANE_STRAIN",
     "SOLID",

@@ -96,10 +96,13 @@ def resolve(lattice: Lattice, conditions: Sequence[Condition]) -> BoundaryTable:
 
     width = max((len(parts) for parts in terms.values()), default=0)
     amplitude = np.zeros((len(nodes), width, dim))
-    function = np.zeros((len(nodes), width), dtype=np.int32)
+    spare = len(functions)  # short rows end in a constant zero, since zero times a drive that is NaN is NaN
+    function = np.full((len(nodes), width), spare, dtype=np.int32)
     for row, parts in terms.items():
         for k, (vector, index) in enumerate(parts):
             amplitude[row, k], function[row, k] = vector, index
+    if (function == spare).any():
+        functions.append(0.0)
     return BoundaryTable(nodes, projectors, stress, tuple(functions), amplitude, function, moved)
 
 
@@ -130,7 +133,7 @@ def _groups(lattice: Lattice, conditions: Sequence[Condition]) -> dict[Signature
                 raise SceneError(
                     f"conditions[{index}]",
                     condition,
-                    f"node {node} at {tuple(lattice.nodes[node])} lies on no selected boundary face; "
+                    f"node {node} at {tuple(lattice.nodes[node].tolist())} lies on no selected boundary face; "
                     f"give normal=…",
                 )
             signatures[node].append((index, normals))
@@ -178,16 +181,21 @@ def _refuse_contradiction(directions, rows, signature, conditions, points) -> No
     functions: list[TimeFunction] = []
     for _, parts in rows:
         functions += [f for _, f in parts if f not in functions and (callable(f) or f != 0.0)]
-    targets = np.zeros((len(rows), max(1, len(functions))))
+    targets = np.zeros((len(rows), max(1, len(functions)), len(points)))
     for row, (_, parts) in enumerate(rows):
         for coefficient, function in parts:
             if function in functions:
-                targets[row, functions.index(function)] += coefficient[0]
-    if np.abs(left[:, rank:].T @ targets).max(initial=0.0) > 1e-9 * (1.0 + np.abs(targets).max()):
-        names = " and ".join(f"conditions[{index}] = {conditions[index]}" for index, _ in signature)
-        at = tuple(float(x) for x in points[0])
+                targets[row, functions.index(function)] += coefficient
+    violation = np.abs(np.tensordot(left[:, rank:].T, targets, 1)).max(axis=(0, 1), initial=0.0)
+    worst = int(violation.argmax())
+    if violation[worst] > 1e-9 * (1.0 + np.abs(targets).max()):
+        (first, _), *others = signature
+        names = " and ".join(f"conditions[{index}] = {conditions[index]}" for index, _ in others)
+        at = tuple(points[worst].tolist())
         raise SceneError(
-            "conditions", names, f"they give the node at {at} m different velocities in one direction"
+            f"conditions[{first}]",
+            conditions[first],
+            f"with {names} it gives the node at {at} m different velocities in one direction",
         )
 
 

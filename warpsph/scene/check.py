@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
+
+from ..errors import SceneError
+from .validate import instance, number
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,13 @@ class Check:
     unit: str
     bound: float
     relative: bool = True
+
+    def __post_init__(self):
+        for field in ("value", "reference"):
+            instance(f"Check.{field}", getattr(self, field), Real, "a number")
+        number("Check.bound", self.bound, at_least=0.0)
+        if self.relative and self.reference == 0.0:
+            raise SceneError("Check.reference", self.reference, "with relative=True it must not be zero")
 
     @property
     def error(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from .validate import number
+from .validate import listed, number
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,12 @@ class Table:
     values: tuple[float, ...]
 
     def __post_init__(self):
-        times, values = tuple(self.times), tuple(self.values)
+        times, values = (
+            tuple(number(name, part) for part in listed(name, given, object, "a sequence of numbers"))
+            for name, given in (("Table.times", self.times), ("Table.values", self.values))
+        )
         if len(times) != len(values) or len(times) < 2 or np.any(np.diff(times) <= 0):
             raise SceneError("Table.times", times, "it must rise, with as many values as times, two or more")
-        for value in (*times, *values):
-            number("Table", value)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
 

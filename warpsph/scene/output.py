@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SceneError, one_of
+from ..errors import SceneError
 from .selection import Selection
-from .validate import instance, number, vector
+from .validate import choice, index, instance, listed, number, vector
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Probe:
 
     def __post_init__(self):
         instance("Probe.name", self.name, str, "a name")
+        instance("Probe.unit", self.unit, str, "a unit, for example 'Pa'")
         instance("Probe.function", self.function, Callable, "a function of the simulation")
 
 
@@ -46,12 +47,18 @@ class NodeValue:
     component: int = 0
 
     def __post_init__(self):
+        instance("NodeValue.field", self.field, str, "the name of a field")
         object.__setattr__(self, "near", vector("NodeValue.near", self.near))
 
     def __call__(self, simulation) -> float:
-        values = simulation.field(self.field)
-        node = simulation.nearest_node(self.near)
-        return float(values[node] if values.ndim == 1 else values[node, self.component])
+        values = component("NodeValue", simulation.field(self.field), self.component)
+        return float(values[simulation.nearest_node(self.near)])
+
+
+def component(owner: str, values: np.ndarray, which: int) -> np.ndarray:
+    """One component (n,) of the values (n, …) of a field; a tensor's are counted row by row."""
+    parts = values.reshape(len(values), -1)
+    return parts[:, index(f"{owner}.component", which, below=parts.shape[1])]
 
 
 @dataclass(frozen=True)
@@ -69,8 +76,13 @@ class EdgeForce:
     on: Selection
     axis: int
 
+    def __post_init__(self):
+        instance("EdgeForce.on", self.on, Selection, "a selection such as edge('top')")
+        index("EdgeForce.axis", self.axis)
+
     def __call__(self, simulation) -> float:
         lattice, continuum = simulation.lattice, simulation.lattice.continuum
+        index("EdgeForce.axis", self.axis, below=continuum.dim)
         chosen = self.on.nodes(lattice)[lattice.faces].all(axis=1) & self.on.faces(lattice)
         if not chosen.any():
             raise SceneError("EdgeForce.on", self.on, "it must hold all nodes of at least one boundary face")
@@ -121,13 +133,25 @@ class Output:
 
     def __post_init__(self):
         names = ["step", "time"]
+        object.__setattr__(self, "probes", listed("Output.probes", self.probes, Probe, "a sequence of Probe"))
         for probe in self.probes:
-            instance("Output.probes", probe, Probe, "a tuple of Probe")
             if probe.name in names:
                 raise SceneError("Output.probes", probe.name, f"names must differ, and from {names[:2]}")
             names.append(probe.name)
         if self.interval is not None:
             number("Output.interval", self.interval, at_least=0.0)
-        for name in self.curve or ():
-            if name not in names:
-                raise SceneError("Output.curve", name, one_of(names, name))
+        if self.curve is not None:
+            for name in _pair("Output.curve", self.curve, "the names of two probes"):
+                choice("Output.curve", name, names)
+        if self.curve_reference is not None:
+            label, value = _pair("Output.curve_reference", self.curve_reference, "a label and a value")
+            instance("Output.curve_reference", label, str, "a label and a value")
+            number("Output.curve_reference", value)
+        instance("Output.field", self.field, str, "the name of a field")
+        index("Output.component", self.component)
+
+
+def _pair(field: str, value: object, allowed: str) -> tuple[object, object]:
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise SceneError(field, value, f"it must be {allowed}")
+    return value[0], value[1]

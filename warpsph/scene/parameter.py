@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
 from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .validate import instance, number
 
 
 @dataclass(frozen=True)
@@ -17,10 +18,11 @@ class Parameter:
     Args:
         name: its name.
         default: its default; its type (float, int, bool or str) is the type of every value. None stands for
-            "chosen by warpsph" and takes numbers.
+            "chosen by warpsph", written `auto`, and takes numbers.
         unit: its unit, `-` for none.
         meaning: one line.
         choices: the allowed values, if only some are.
+        automatic: whether a number may also be `auto`.
     """
 
     name: str
@@ -28,22 +30,28 @@ class Parameter:
     unit: str
     meaning: str
     choices: tuple[str, ...] = ()
+    automatic: bool = False
+
+    def __post_init__(self):
+        instance("Parameter.name", self.name, str, "a name")
+        for field in ("unit", "meaning"):
+            instance(f"Parameter.{field}", getattr(self, field), str, "a text")
+        instance(self.name, self.default, float | int | str | None, "a number, True or False, a text or None")
 
     def parse(self, text: object) -> float | int | bool | str | None:
         """The value a command line gives."""
-        value = str(text).strip()
+        value, automatic = str(text).strip(), self.automatic or self.default is None
         if self.choices and value not in self.choices:
             raise SceneError(self.name, value, one_of(self.choices, value))
         try:
             if isinstance(self.default, bool):
                 return {"true": True, "false": False, "1": True, "0": False}[value.lower()]
-            if self.default is None:
-                return None if value.lower() in ("auto", "none") else float(value)
-            return type(self.default)(value)
+            if automatic and value.lower() in ("auto", "none"):
+                return None
+            return float(value) if self.default is None else type(self.default)(value)
         except (KeyError, ValueError):
-            kind = {bool: "true or false", int: "a whole number", float: "a number"}
-            allowed = kind.get(type(self.default), "a number or auto")
-            raise SceneError(self.name, value, f"it must be {allowed}") from None
+            kind = {bool: "true or false", int: "a whole number"}.get(type(self.default), "a number")
+            raise SceneError(self.name, value, f"it must be {kind}{' or auto' if automatic else ''}") from None
 
 
 def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...]:
@@ -61,13 +69,15 @@ def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...
         "source_scheme": ("rk4", "-", f"sources: {', '.join(SOURCE_SCHEMES)}", SOURCE_SCHEMES),
         "time_step": (None, "s", "Δt; auto follows from courant and the stiffness of the sources", ()),
     }
-    for name in defaults:
+    automatic = [name for name, row in standard.items() if row[0] is None]
+    for name, value in instance("NUMERICS", defaults, Mapping, "a dictionary").items():
         if name not in standard:
             raise SceneError("NUMERICS", name, one_of(standard, name))
-    return tuple(
-        Parameter(name, defaults.get(name, default), unit, meaning, choices)
-        for name, (default, unit, meaning, choices) in standard.items()
-    )
+        _, unit, meaning, choices = standard[name]
+        if not choices and value is not None:
+            value = number(f"NUMERICS[{name!r}]", value)
+        standard[name] = value, unit, meaning, choices
+    return tuple(Parameter(name, *row, automatic=name in automatic) for name, row in standard.items())
 
 
 def assign(parameters: Iterable[Parameter], settings: Iterable[str]) -> dict[str, object]:

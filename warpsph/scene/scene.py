@@ -22,6 +22,7 @@ from .validate import (
     field_of_position,
     flag,
     instance,
+    listed,
     number,
     time_function,
     vector,
@@ -97,10 +98,9 @@ class Scene:
         object.__setattr__(self, "duration", number("duration", self.duration, above=0.0))
         object.__setattr__(self, "damping", number("damping", self.damping, at_least=0.0))
         flag("large_displacements", self.large_displacements)
-        try:
-            object.__setattr__(self, "conditions", tuple(self.conditions))
-        except TypeError:
-            raise SceneError("conditions", self.conditions, "it must be a sequence of conditions") from None
+        object.__setattr__(
+            self, "conditions", listed("conditions", self.conditions, object, "a sequence of conditions")
+        )
         for index, condition in enumerate(self.conditions):
             instance(f"conditions[{index}]", condition, Condition, "a condition such as Fixed(edge('left'))")
         dim = self.lattice.dim

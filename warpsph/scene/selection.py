@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SceneError, one_of
+from ..errors import SceneError
 from .lattice import Lattice
-from .validate import field_of_position, vector
+from .validate import choice, field_of_position, vector
 
 
 class Selection:
@@ -54,10 +54,8 @@ class edge(Selection):  # noqa: N801 - written as a word in scenes
 
     def faces(self, lattice: Lattice) -> np.ndarray:
         names = lattice.continuum.edges
-        if self.name == "boundary":
+        if choice("edge", self.name, (*names, "boundary")) == "boundary":
             return np.ones(len(lattice.faces), dtype=bool)
-        if self.name not in names:
-            raise SceneError("edge", self.name, one_of((*names, "boundary"), self.name))
         return lattice.face_side == names.index(self.name)
 
 

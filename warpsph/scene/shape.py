@@ -20,15 +20,15 @@ class Shape:
         """The initial nodes, cells and boundary faces."""
         raise NotImplementedError
 
-    def rotated(self, angle: float, about: tuple[float, ...] | None = None) -> Mapped:
+    def rotated(self, angle: float, about: tuple[float, float] | None = None) -> Mapped:
         """The shape with its lattice turned by `angle` [rad], anticlockwise in the x-y plane.
 
         Args:
             angle: angle [rad].
-            about: centre of the rotation [m]; the origin unless given.
+            about: centre of the rotation (x, y) [m]; the origin unless given.
         """
         angle = number("rotated.angle", angle)
-        centre = np.zeros(2) if about is None else np.array(vector("rotated.about", about)[:2])
+        centre = (0.0, 0.0) if about is None else vector("rotated.about", about, 2)
         cos, sin = math.cos(angle), math.sin(angle)
 
         def turn(x, y, *z):
@@ -67,6 +67,7 @@ class Box(Shape):
         for length in size:
             number("size", length, above=0.0)
         spacing = number("spacing", self.spacing, above=0.0)
+        _limit_cells(size, spacing)
         for length in size:
             cells = round(length / spacing)
             if cells < 1 or abs(length / spacing - cells) > 1e-6 * cells:
@@ -76,7 +77,6 @@ class Box(Shape):
                     spacing,
                     f"the size {length:g} m must be a whole number of spacings, for example {length / fit:.6g}",
                 )
-        _limit_cells(size, spacing)
         origin = (0.0,) * len(size) if self.origin is None else vector("origin", self.origin, len(size))
         for name, value in (("size", size), ("spacing", spacing), ("origin", origin)):
             object.__setattr__(self, name, value)
@@ -111,10 +111,11 @@ class Disc(Shape):
 
     def lattice(self) -> Lattice:
         centre = np.array(self.centre)
+        half = 0.5 * self.spacing * math.ceil(2.0 * self.radius / self.spacing - 1e-9)  # centres the lattice
         return _cut(
             lambda p: np.sum((p - centre) ** 2, axis=-1) < self.radius**2,
-            centre - self.radius,
-            centre + self.radius,
+            centre - half,
+            centre + half,
             self.spacing,
         )
 
@@ -176,7 +177,7 @@ LARGEST_LATTICE = 10**9
 
 
 def _limit_cells(size, spacing: float) -> None:
-    cells = math.prod(float(length) / spacing for length in size)
+    cells = math.prod(max(1.0, float(length) / spacing) for length in size)
     if not cells < LARGEST_LATTICE:
         raise SceneError(
             "spacing", spacing, f"it must give fewer than {LARGEST_LATTICE:.0e} cells, here {cells:.3g}"

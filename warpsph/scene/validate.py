@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from numbers import Real
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -34,18 +34,34 @@ def number(
         if limit is not None
     ]
     allowed = "it must be a finite number" + (" " + " and ".join(bounds) if bounds else "")
-    if isinstance(value, bool) or not isinstance(value, Real | np.number) or not math.isfinite(value):
-        raise SceneError(field, value, allowed)
-    value = float(value)
+    real = _real(value)
     inside = (
-        (above is None or value > above)
-        and (below is None or value < below)
-        and (at_least is None or value >= at_least)
-        and (at_most is None or value <= at_most)
+        math.isfinite(real)
+        and (above is None or real > above)
+        and (below is None or real < below)
+        and (at_least is None or real >= at_least)
+        and (at_most is None or real <= at_most)
     )
     if not inside:
         raise SceneError(field, value, allowed)
-    return value
+    return real
+
+
+def _real(value: object) -> float:
+    """The value as a float; NaN for what is no real number, or too large to be a float."""
+    try:
+        return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        return math.nan
+
+
+def index(field: str, value: object, below: int | None = None) -> int:
+    """A whole number from 0 on."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or value < 0 or (below is not None and value >= below):
+        limit = "" if below is None else f" and below {below}"
+        raise SceneError(field, value, f"it must be a whole number, at least 0{limit}")
+    return int(value)
 
 
 def flag(field: str, value: object) -> bool:
@@ -65,9 +81,10 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
 
 def vector(field: str, value: object, dim: int | None = None) -> tuple[float, ...]:
     """A sequence of finite numbers, `dim` of them when given; a bare number counts as one component."""
-    parts = (value,) if isinstance(value, Real | np.number) else value
+    parts = value.tolist() if isinstance(value, np.ndarray) else value
+    parts = (parts,) if isinstance(parts, Real) else parts
     allowed = f"it must be a sequence of {dim or '1, 2 or 3'} finite numbers"
-    if not isinstance(parts, Sequence | np.ndarray) or isinstance(parts, str):
+    if not isinstance(parts, Sequence) or isinstance(parts, str | bytes):
         raise SceneError(field, value, allowed)
     if len(parts) != dim if dim else len(parts) not in (1, 2, 3):
         raise SceneError(field, value, allowed)
@@ -75,6 +92,17 @@ def vector(field: str, value: object, dim: int | None = None) -> tuple[float, ..
         return tuple(number(field, part) for part in parts)
     except SceneError:
         raise SceneError(field, value, allowed) from None
+
+
+def listed(field: str, value: object, kind: type, allowed: str) -> tuple:
+    """A tuple of objects of the given class; `allowed` completes the sentence "it must be …"."""
+    try:
+        parts = tuple(value)
+    except TypeError:
+        raise SceneError(field, value, f"it must be {allowed}") from None
+    for part in parts:
+        instance(field, part, kind, allowed)
+    return parts
 
 
 def time_function(field: str, value: object) -> TimeFunction:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ class History:
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
         self._rows: list[list[float]] = []
         self._next = 0.0
-        self._file = None if path is None else open(path, "w", newline="", encoding="utf-8")
+        self._file = path.open("w", newline="", encoding="utf-8") if path else None
         self._writer = None if self._file is None else csv.writer(self._file)
         if self._writer:
             self._writer.writerow(f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True))
@@ -40,8 +41,8 @@ class History:
         """Sample when the interval has passed."""
         if simulation.time < self._next * (1.0 - 1e-9):
             return
-        while self._interval > 0.0 and self._next <= simulation.time * (1.0 + 1e-9):
-            self._next += self._interval
+        if self._interval > 0.0:
+            self._next = (math.floor(simulation.time / self._interval * (1.0 + 1e-9)) + 1) * self._interval
         self.sample(simulation)
 
     def sample(self, simulation: Simulation) -> None:

@@ -17,7 +17,7 @@ from ..nodes.node_sets import (
 )
 from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.free_surface import FreeSurfaceConditions
-from ..operators.motion import Motion, NoMotion, centre_kernel
+from ..operators.motion import Motion, NoMotion, centre_kernel, half_step_gradient, initial_gradient
 from ..operators.sources import SOURCE_SCHEMES
 from ..operators.sweep import sweep
 from ..operators.waves import wave_rate
@@ -74,6 +74,7 @@ class Stepper:
             numerics.kernel,
             law.Parameters,
             numerics.velocity_scheme,
+            scene.large_displacements,
             self.conditions.types,
         )
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
@@ -186,6 +187,7 @@ def _to_nodes_kernel(
     kernel: str,
     Parameters: type,
     scheme: str,
+    moves: bool,
     conditions: ConditionTypes,
 ):
     types = node_types(continuum, precision)
@@ -196,6 +198,7 @@ def _to_nodes_kernel(
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
+    to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_nodes(
@@ -210,8 +213,8 @@ def _to_nodes_kernel(
         point = nodes.point[i]
         sums = collect(i, point.x, nodes.smoothing_length[i], point.phi, pairs, auxiliary.point)
         phi_half = apply(i, value(sums), conditions)  # 7
-        grad = gradient(sums, phi_half)
-        minus_div_f = rate(grad, real(1.0) / nodes.density[i], material)  # 8-9
+        grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
+        minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 
         v_half = velocity(phi_half)
         sigma_adv = stress(point.phi) + dt * stress(minus_div_f)  # 10a

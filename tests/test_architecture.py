@@ -1,0 +1,38 @@
+"""Imports point one way: every room of the package only knows the rooms below it."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import warpsph
+
+PACKAGE = Path(warpsph.__file__).parent
+ROOMS = ("errors", "scene", "ground", "nodes", "operators", "step", "simulation", "cli")
+FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
+
+
+def imported_rooms(path):
+    """Rooms of this package that a file imports, from its relative imports."""
+    depth = len(path.relative_to(PACKAGE).parts)  # dots that reach the package itself
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level == depth:
+            names = [node.module] if node.module else [alias.name for alias in node.names]
+            yield from (name.split(".")[0] for name in names)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_down(path):
+    own = ROOMS.index(path.relative_to(PACKAGE).parts[0])
+    for room in imported_rooms(path):
+        if room != "__version__":
+            assert ROOMS.index(room) <= own, f"{path.name} imports {room}"
+
+
+def test_scene_description_knows_no_warp():
+    for path in (PACKAGE / "scene").rglob("*.py"):
+        assert "import warp" not in path.read_text(encoding="utf-8"), path
+
+
+def test_files_are_small_enough_for_one_purpose():
+    assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 400 for path in FILES)

@@ -1,0 +1,188 @@
+"""Sources at a point: relaxation, softening, sub-stepping, spin, damping, against exact solutions or tensors."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warpsph import BodyForce, Box, Elastic, Numerics, PerzynaVonMises, Scene, Simulation
+from warpsph.ground.kinematics import kinematics
+from warpsph.ground.precision import PRECISIONS
+from warpsph.scene import BAR, PLANE_STRAIN, SOLID
+
+STRESS = {1: (3e5,), 2: (3e5, -1e5, 5e4, 2e4), 3: (3e5, -1e5, 2e4, 5e4, -4e4, 6e4)}
+
+
+def tensor(stress, continuum):
+    full = np.zeros((3, 3))
+    for value, (i, j) in zip(stress, continuum.pairs, strict=True):
+        full[i, j] = full[j, i] = value
+    return full
+
+
+def stored(full, continuum):
+    return np.array([full[i, j] for i, j in continuum.pairs])
+
+
+def q_of(full):
+    deviator = full - np.trace(full) / 3.0 * np.eye(3)
+    return np.sqrt(1.5 * (deviator**2).sum())
+
+
+def relaxing(dim, device="cpu", precision="float64", **material):
+    """A body at uniform stress and rest: nothing but the sources acts."""
+    scene = Scene(
+        shape=Box((1.0,) * dim, 0.25),
+        material=PerzynaVonMises(young_modulus=8e7, poisson_ratio=0.3, density=2000.0, **material),
+        stress=lambda *x: STRESS[dim],
+        duration=1.0,
+        numerics=Numerics(time_step=2e-4),
+    )
+    return Simulation(scene, device=device, precision=precision)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_relaxation_follows_its_exponential(device, precision, dim):
+    """q = Y + (q₀ − Y) e^{−M γ t/Y}, M = 3G (E in a bar), for N = 1, H = 0; the mean stress stays.
+
+    RK4's error per half step is z⁵/120 of the overstress, z = M γ Δt/(2Y), and adds up to at most the number of
+    half steps times that.
+    """
+    simulation = relaxing(dim, device, precision, fluidity=0.5, yield_size=1e5)
+    material = simulation.scene.material
+    start, continuum = simulation.field("von_mises_stress"), simulation.lattice.continuum
+    for _ in range(20):
+        simulation.step()
+    rate = material.relaxation_modulus(dim) * material.fluidity / material.yield_size
+    exact = 1e5 + (start - 1e5) * np.exp(-rate * simulation.time)
+    z = 0.5 * rate * 2e-4
+    tolerance = 40 * z**5 / 120 + (1e-12 if precision == "float64" else 1e-5)
+    np.testing.assert_allclose(simulation.field("von_mises_stress"), exact, rtol=tolerance)
+    eps = (start - exact) / material.relaxation_modulus(dim)
+    np.testing.assert_allclose(simulation.field("equivalent_plastic_strain"), eps, rtol=100 * tolerance)
+    if dim > 1:
+        mean = np.trace(tensor(STRESS[dim], continuum)) / 3.0
+        np.testing.assert_allclose(simulation.field("mean_stress"), mean, rtol=1e-5)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_stiff_relaxation_is_substepped_and_stable(dim):
+    """M γ Δt/(2Y) = 27 to 36: ten times what one RK4 step bears. The stress lands on the yield surface."""
+    simulation = relaxing(dim, fluidity=450.0 if dim == 1 else 390.0, yield_size=1e5)
+    for _ in range(3):
+        simulation.step()
+    np.testing.assert_allclose(simulation.field("von_mises_stress"), 1e5, rtol=1e-9)
+
+
+def test_softening_relaxation_ends_where_stress_and_yield_size_meet():
+    """q falls by 3G and Y by −H for every ε̄, so they meet after ε̄ = (q₀ − Y0)/(3G + H), however they get there."""
+    simulation = relaxing(2, fluidity=20.0, yield_size=2e5, hardening=-2e7)
+    start, shear = simulation.field("von_mises_stress"), simulation.scene.material.shear_modulus
+    for _ in range(200):
+        simulation.step()
+    eps = (start - 2e5) / (3 * shear - 2e7)
+    np.testing.assert_allclose(simulation.field("equivalent_plastic_strain"), eps, rtol=1e-9)
+    np.testing.assert_allclose(simulation.field("yield_size"), 2e5 - 2e7 * eps, rtol=1e-9)
+    np.testing.assert_allclose(simulation.field("von_mises_stress"), 2e5 - 2e7 * eps, rtol=1e-9)
+
+
+def test_softening_stops_at_the_residual_yield_size():
+    simulation = relaxing(2, fluidity=20.0, yield_size=2e5, hardening=-2e7, residual_ratio=0.9)
+    for _ in range(200):
+        simulation.step()
+    np.testing.assert_allclose(simulation.field("yield_size"), 0.9 * 2e5, rtol=1e-12)
+    np.testing.assert_allclose(simulation.field("von_mises_stress"), 0.9 * 2e5, rtol=1e-9)
+
+
+def test_an_exponent_slows_flow_near_yield():
+    """N = 2: dq/dt = −3G γ ((q − Y)/Y)² gives (q − Y)/Y = f₀/(1 + f₀ 3G γ t/Y)."""
+    simulation = relaxing(2, fluidity=0.5, yield_size=1e5, exponent=2.0)
+    start = simulation.field("von_mises_stress")[0] / 1e5 - 1.0
+    for _ in range(50):
+        simulation.step()
+    rate = 3 * simulation.scene.material.shear_modulus * 0.5 / 1e5
+    exact = start / (1.0 + start * rate * simulation.time)
+    np.testing.assert_allclose(simulation.field("von_mises_stress") / 1e5 - 1.0, exact, rtol=1e-5)
+
+
+def test_damping_and_a_ramped_body_force_follow_their_ode():
+    """dv/dt = g t/T − c v: v = g/(c T) (t − (1 − e^{−ct})/c); RK4 over half steps of c Δt/2 = 0.005."""
+    scene = Scene(
+        shape=Box((1.0, 1.0), 0.25),
+        material=Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0),
+        body_force=BodyForce((0.0, -10.0), lambda t: t / 0.1),
+        damping=50.0,
+        duration=1.0,
+        numerics=Numerics(time_step=2e-4),
+    )
+    simulation = Simulation(scene, device="cpu")
+    for _ in range(200):
+        simulation.step()
+    c, t = 50.0, simulation.time
+    exact = -10.0 / (c * 0.1) * (t - (1.0 - np.exp(-c * t)) / c)
+    np.testing.assert_allclose(simulation.field("velocity")[:, 1], exact, rtol=1e-9)
+    assert np.abs(simulation.field("velocity")[:, 0]).max() <= 1e-15 * np.abs(exact)
+
+
+def evaluate(continuum, precision, L, sigma, gradient, q, moduli):
+    """All functions of a continuum's kinematics at one point, from a kernel; outputs poisoned."""
+    real, d, s = PRECISIONS[precision], continuum.dim, continuum.stress_size
+    kin = kinematics(continuum, real)
+    elastic_rate, divergence, spin = kin.elastic_rate, kin.divergence, kin.spin
+    von_mises, relaxation = kin.von_mises, kin.relaxation
+    stress, vector, scalar = real.vec(s), real.vec(d), real.real
+    tensor_type, gradient_type = real.mat(d, d), real.mat(s, d)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def probe(
+        L: tensor_type,
+        sigma: stress,
+        gradient: gradient_type,
+        q: scalar,
+        lame: scalar,
+        shear: scalar,
+        young: scalar,
+        stresses: wp.array(dtype=stress),
+        divergences: wp.array(dtype=vector),
+        invariants: wp.array(dtype=scalar),
+    ):
+        stresses[0] = elastic_rate(L, lame, shear, young)
+        stresses[1] = spin(sigma, L)
+        stresses[2] = relaxation(sigma, q, shear, young)
+        divergences[0] = divergence(gradient)
+        invariants[0] = von_mises(sigma)
+
+    outputs = [
+        wp.full(3, stress(np.nan), dtype=stress, device="cpu"),
+        wp.full(1, vector(np.nan), dtype=vector, device="cpu"),
+        wp.full(1, np.nan, dtype=scalar, device="cpu"),
+    ]
+    inputs = [tensor_type(L), stress(sigma), gradient_type(gradient), q, *moduli]
+    wp.launch(probe, 1, inputs=inputs, outputs=outputs, device="cpu")
+    return [output.numpy() for output in outputs]
+
+
+@pytest.mark.parametrize("continuum", [BAR, PLANE_STRAIN, SOLID], ids=lambda c: c.name)
+def test_kinematics_agree_with_three_by_three_tensors(continuum, precision):
+    """Elastic rate, spin, von Mises stress, relaxation and divergence, from random L, σ and ∇σ."""
+    rng = np.random.default_rng(7)
+    d, s = continuum.dim, continuum.stress_size
+    L, sigma, gradient = rng.normal(size=(d, d)), rng.normal(size=s), rng.normal(size=(s, d))
+    young, lame, shear = 3.0, 1.2, 0.8
+    full, L3 = tensor(sigma, continuum), np.zeros((3, 3))
+    L3[:d, :d] = L
+    strain_rate, spin = 0.5 * (L3 + L3.T), 0.5 * (L3 - L3.T)
+    elastic = young * L3 if d == 1 else lame * np.trace(L3) * np.eye(3) + 2 * shear * strain_rate
+    q = q_of(full)
+    relaxation = (full * young if d == 1 else 3 * shear * (full - np.trace(full) / 3 * np.eye(3))) / q
+    divergence = [sum(gradient[_index(continuum, i, j), j] for j in range(d)) for i in range(d)]
+
+    stresses, divergences, invariants = evaluate(continuum, precision, L, sigma, gradient, q, (lame, shear, young))
+    tolerance = {"rtol": 1e-12, "atol": 1e-12} if precision == "float64" else {"rtol": 2e-5, "atol": 2e-6}
+    for actual, expected in zip(stresses, (elastic, spin @ full - full @ spin, relaxation), strict=True):
+        np.testing.assert_allclose(actual, stored(expected, continuum), **tolerance)
+    np.testing.assert_allclose(divergences[0], divergence, **tolerance)
+    np.testing.assert_allclose(invariants[0], q, **tolerance)
+
+
+def _index(continuum, i, j):
+    return next(k for k, pair in enumerate(continuum.pairs) if set(pair) == {i, j})
