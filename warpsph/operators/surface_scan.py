@@ -12,9 +12,9 @@ wherever n points, also in a lattice stretched by 1.8 (1.5 in 3D).
 
 Improved normals. In the plane the paper takes the mean of the perpendiculars to p = x_J − x, J on the surface.
 Here m is the unit vector most nearly perpendicular to all of them, outward by Marrone's n, in two and three
-dimensions: it minimises Σ w (m·p̂ + c|p|)² over m and c. Without c, and with one neighbour a side, m is the paper's
-mean; c is half the curvature, and makes m exact on a circle and a sphere however the nodes stand there, where the
-mean errs by the curvature times a quarter of the difference between the two distances.
+dimensions: it minimises Σ w (m·p̂ + c|p|)² over m and c. With c = 0, w = 1 and one neighbour a side, m is the
+paper's mean; c is half the curvature, and makes m exact on a circle and a sphere however the nodes stand there,
+where the mean errs by the curvature times a quarter of the difference between the two distances.
 """
 
 import math
