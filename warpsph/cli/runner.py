@@ -17,6 +17,7 @@ from ..simulation.history import History
 from ..simulation.plots import plot_field, plot_history
 from ..simulation.simulation import Simulation
 from ..simulation.summary import summarise, write_json
+from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
 
@@ -75,6 +76,8 @@ def run(
     if error is None:
         plot_field(simulation, folder / "field.png")
         pictures.append("field.png")
+        if plot_surface(simulation, folder / "surface.png"):
+            pictures.append("surface.png")
     say(
         f"{simulation.steps} steps to t = {simulation.time:.6g} s in {wall_time:.1f} s, "
         f"{summary['node_steps_per_second']:.3g} node-steps/s"

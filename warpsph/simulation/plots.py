@@ -42,7 +42,7 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
 def plot_field(simulation: Simulation, path: Path) -> None:
     """Draw the scene's field at the present time, on the deformed nodes, into a PNG."""
     output, lattice = simulation.scene.output, simulation.lattice
-    values = simulation.field(output.field)
+    values = simulation.field(output.field).astype(float)
     name = output.field
     if values.ndim > 1:
         name = f"{name} {_component(values, output.field, output.component, lattice.continuum)}"
