@@ -66,7 +66,7 @@ def shape(body, spacing):
 
 
 def exact_normals(body, x, y):
-    """Exact normals at positions on the edge, and which of them lie on the smooth free edge; shapes (n, 2), (n,)."""
+    """Exact normals at the positions of edge nodes (n, 2), and which of them lie on the smooth free edge (n,)."""
     if body == "wave":
         k = 2.0 * np.pi
         normals = np.stack([-AMPLITUDE * k * np.cos(k * x), np.ones_like(x)], axis=1)
