@@ -24,7 +24,7 @@ class Kinematics:
         spin: (σ, L) → ω σ − σ ω (Jaumann).
         von_mises: σ → q = √(3 J₂); |σ| in a bar.
         relaxation: (σ, q, G, E) → Dₑ : ∂q/∂σ = 3 G s/q; E σ/q in a bar.
-        restrict: (σ, P) → P σ P of the components in space; σ33 of plane strain is kept.
+        transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
     """
 
     elastic_rate: wp.Function
@@ -32,7 +32,7 @@ class Kinematics:
     spin: wp.Function
     von_mises: wp.Function
     relaxation: wp.Function
-    restrict: wp.Function
+    transform: wp.Function
 
 
 @cache
@@ -67,10 +67,10 @@ def _bar(precision: Precision) -> Kinematics:
         return (young / q) * sigma
 
     @wp.func
-    def restrict(sigma: stress, P: matrix):
+    def transform(sigma: stress, P: matrix):
         return P[0, 0] * sigma * P[0, 0]
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, restrict)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 def _plane_strain(precision: Precision) -> Kinematics:
@@ -113,11 +113,11 @@ def _plane_strain(precision: Precision) -> Kinematics:
         return (real(3.0) * shear / q) * deviator
 
     @wp.func
-    def restrict(sigma: stress, P: matrix):
-        s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * P
+    def transform(sigma: stress, P: matrix):
+        s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * wp.transpose(P)
         return stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, restrict)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 def _solid(precision: Precision) -> Kinematics:
@@ -167,10 +167,10 @@ def _solid(precision: Precision) -> Kinematics:
         return (real(3.0) * shear / q) * deviator
 
     @wp.func
-    def restrict(sigma: stress, P: matrix):
-        return stored(P * tensor(sigma) * P)
+    def transform(sigma: stress, P: matrix):
+        return stored(P * tensor(sigma) * wp.transpose(P))
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, restrict)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 _KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {

@@ -107,7 +107,7 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
     """The conditions' table and function, with the free surface: P of each candidate after all else."""
     phi, walls = unknowns(continuum, precision), condition_types(continuum, precision)
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    apply_walls, restrict = walls.apply, kinematics(continuum, precision).restrict
+    apply_walls, transform = walls.apply, kinematics(continuum, precision).transform
 
     @wp.struct
     class Table:
@@ -120,7 +120,7 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
         result = apply_walls(i, values, table.conditions)
         c = table.row[i]
         if c >= 0:
-            result = join(velocity_of(result), restrict(stress_of(result), table.projector[c]))
+            result = join(velocity_of(result), transform(stress_of(result), table.projector[c]))
         return result
 
     return ConditionTypes(Table, apply)

@@ -18,7 +18,7 @@ from ..nodes.node_sets import (
 from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.motion import Motion, NoMotion, centre_kernel, half_step_gradient, initial_gradient
-from ..operators.sources import SOURCE_SCHEMES
+from ..operators.sources import sources
 from ..operators.sweep import sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
@@ -62,7 +62,7 @@ class Stepper:
         search = (support, lattice.spacing, skin)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
-        self._sources = SOURCE_SCHEMES[numerics.source_scheme](scene, law, self._parameters, precision)
+        self._sources = sources(scene, law, self._parameters, precision)
         if scene.free_surface is None:
             self.conditions = Conditions(scene.boundary, n, continuum, precision, device)
         else:
