@@ -49,6 +49,14 @@ from .scene import (
     where,
 )
 from .simulation.history import History
+from .simulation.measures import (
+    Sampler,
+    checkerboard_amplitude,
+    fit_band,
+    growth_rate,
+    smallest_distance,
+    trace_ridge,
+)
 from .simulation.simulation import Observer, Simulation
 
 __version__ = "0.1.0"
@@ -79,14 +87,20 @@ __all__ = [
     "Ramp",
     "Roller",
     "Rotating",
+    "Sampler",
     "Scene",
     "SceneError",
     "Shape",
     "Simulation",
     "Table",
     "WarpSPHError",
+    "checkerboard_amplitude",
     "edge",
     "everywhere",
+    "fit_band",
+    "growth_rate",
     "region",
+    "smallest_distance",
+    "trace_ridge",
     "where",
 ]

@@ -4,6 +4,7 @@ A scene file defines
 
     PARAMETERS = (Parameter("spacing", 0.1, "m", "distance between nodes"), …)
     NUMERICS = {"courant": 1.0}          # optional: its defaults of the numerical parameters
+    SHORT = ("duration=5",)              # optional: settings of a short form, for what takes minutes
     def scene(p): return Scene(…, numerics=p.numerics)
     def checks(run): return [Check(…), …]   # optional; run has .simulation, .history, .scene, .parameters
 
@@ -64,6 +65,11 @@ class SceneFile:
                 raise SceneError("PARAMETERS", name, "this name is taken")
         return parameters
 
+    @property
+    def short(self) -> tuple[str, ...]:
+        """Settings `name=value` of its short form; none when the whole run is short."""
+        return tuple(listed("SHORT", getattr(self.module, "SHORT", ()), str, "a sequence of name=value texts"))
+
     def build(self, settings: Sequence[str]) -> tuple[Scene, dict[str, object]]:
         """The scene with `name=value` settings applied, and the values of its parameters."""
         values = assign(self.parameters, settings)
@@ -111,12 +117,23 @@ def load(name: str) -> SceneFile:
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their module up there
     try:
-        spec.loader.exec_module(module)
+        with _importing_from(path.parent):
+            spec.loader.exec_module(module)
     except Exception as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
     return SceneFile(path.stem, module)
+
+
+@contextlib.contextmanager
+def _importing_from(folder: Path) -> Iterator[None]:
+    """Lets a scene file import its neighbours, as a script may."""
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
 
 
 def _located(path: Path, error: Exception) -> SceneError:

@@ -13,7 +13,7 @@ from ..errors import SceneError
 from ..ground.precision import PRECISIONS
 from ..scene.validate import number
 from .catalogue import load, shipped
-from .runner import run
+from .runner import run, writable
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -51,6 +51,20 @@ def _parser() -> argparse.ArgumentParser:
     running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
     running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
     running.set_defaults(command=_run)
+
+    reporting = commands.add_parser(
+        "report",
+        help="run every case of the paper and lay it out beside the paper's and the exact results",
+        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call of "
+        "this version with these parameters has finished are kept; delete a run's folder to repeat it.",
+    )
+    reporting.add_argument("--quick", action="store_true", help="coarser and shorter where a case takes minutes")
+    reporting.add_argument(
+        "--out", metavar="DIR", help="folder of the report (default: runs/report, or report-quick)"
+    )
+    reporting.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
+    reporting.add_argument("--jobs", type=int, default=2, help="runs at a time (default: 2)")
+    reporting.set_defaults(command=_report)
     return parser
 
 
@@ -90,6 +104,17 @@ def _run(options: argparse.Namespace) -> int:
         quiet=options.quiet,
     )
     return 0 if passed else 1
+
+
+def _report(options: argparse.Namespace) -> int:
+    from .report.command import report  # matplotlib, and all cases: slow to import
+
+    if options.jobs < 1:
+        raise SceneError("--jobs", options.jobs, "it must be at least 1")
+    default = Path("runs") / ("report-quick" if options.quick else "report")
+    folder = writable(Path(options.out or default))
+    report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
+    return 0
 
 
 if __name__ == "__main__":

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Protocol
 
 from .. import __version__
 from ..errors import NonFiniteError, SceneError
@@ -15,11 +16,18 @@ from ..scene.output import component
 from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.plots import plot_field, plot_history
-from ..simulation.simulation import Simulation
+from ..simulation.simulation import Observer, Simulation
 from ..simulation.summary import summarise, write_json
 from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
+
+
+class ClosingObserver(Observer, Protocol):
+    """An observer that finishes its work when the run ends, however it ends."""
+
+    def close(self) -> None:
+        """Finish."""
 
 
 def run(
@@ -32,12 +40,16 @@ def run(
     until: float | None,
     folder: Path,
     quiet: bool,
+    watching: Sequence[Callable[[Simulation], ClosingObserver]] = (),
 ) -> bool:
-    """Run a scene and write its results into a folder; True when it finished and all checks passed."""
+    """Run a scene and write its results into a folder; True when it finished and all checks passed.
+
+    `watching` makes further observers of the simulation; they are closed before the summary is written.
+    """
     say = (lambda text: None) if quiet else print
     start = clock.perf_counter()
     simulation = Simulation(scene, device=device, precision=precision)
-    folder = _writable(folder)
+    folder = writable(folder)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
@@ -48,16 +60,17 @@ def run(
     with file.blamed():
         history = History(simulation, folder / "history.csv")
     progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
+    observers = [history, progress, *(watch(simulation) for watch in watching)]
     begin, error = clock.perf_counter(), None
     try:
         with file.blamed():
-            simulation.run(until=end, observers=[history, progress])
+            simulation.run(until=end, observers=observers)
             history.sample(simulation)
     except NonFiniteError as failure:
         error = str(failure)
     finally:
-        progress.close()
-        history.close()
+        for observer in observers:
+            observer.close()
     wall_time = clock.perf_counter() - begin
     checks: list[Check] = []
     finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
@@ -98,9 +111,9 @@ def table(checks: Sequence[Check]) -> str:
     rows = [("check", "value", "reference", "unit", "error", "bound", "")]
     for check in checks:
         error, bound = (
-            (f"{100 * check.error:.3g} %", f"{100 * check.bound:.3g} %")
+            (f"{100 * check.error:.3g} %", f"{100 * check.applied_bound:.3g} %")
             if check.relative
-            else (f"{check.error:.3g}", f"{check.bound:.3g}")
+            else (f"{check.error:.3g}", f"{check.applied_bound:.3g}")
         )
         verdict = "passed" if check.passed else "FAILED"
         rows.append(
@@ -112,7 +125,8 @@ def table(checks: Sequence[Check]) -> str:
     )
 
 
-def _writable(folder: Path) -> Path:
+def writable(folder: Path) -> Path:
+    """The folder, made if need be; refused when it can not be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".warpsph"

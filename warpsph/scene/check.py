@@ -21,6 +21,7 @@ class Check:
         unit: unit of both.
         bound: largest allowed error.
         relative: whether the error is |value − reference| / |reference|; the plain difference if not.
+        bound_below: largest allowed error of a value below the reference; `bound` unless given.
     """
 
     name: str
@@ -29,11 +30,14 @@ class Check:
     unit: str
     bound: float
     relative: bool = True
+    bound_below: float | None = None
 
     def __post_init__(self):
         for field in ("value", "reference"):
             instance(f"Check.{field}", getattr(self, field), Real, "a number")
         number("Check.bound", self.bound, at_least=0.0)
+        if self.bound_below is not None:
+            number("Check.bound_below", self.bound_below, at_least=0.0)
         if self.relative and self.reference == 0.0:
             raise SceneError("Check.reference", self.reference, "with relative=True it must not be zero")
 
@@ -44,9 +48,14 @@ class Check:
         return difference / abs(self.reference) if self.relative else difference
 
     @property
+    def applied_bound(self) -> float:
+        """The bound on the side of the reference on which the value lies."""
+        return self.bound if self.bound_below is None or self.value >= self.reference else self.bound_below
+
+    @property
     def passed(self) -> bool:
         """Whether the error is finite and within the bound."""
-        return math.isfinite(self.error) and self.error <= self.bound
+        return math.isfinite(self.error) and self.error <= self.applied_bound
 
     def as_dict(self) -> dict:
         """The check as it stands in `summary.json`."""
@@ -56,6 +65,6 @@ class Check:
             "reference": float(self.reference),
             "unit": self.unit,
             "error": float(self.error),
-            "bound": float(self.bound),
+            "bound": float(self.applied_bound),
             "passed": bool(self.passed),
         }

@@ -5,16 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from ..scene.lattice import Lattice
 from ..scene.output import component
 from .fields import FIELDS
 from .history import History
+from .measures import split_cells
 from .simulation import Simulation
 
 COLOUR_MAP = "cividis"  # readable with every common colour-vision deficiency, and in grey
+DARK, BRIGHT = "#00204d", "#c26a00"  # of lines; told apart in grey as well
 DOTS_PER_INCH = 150
 
 
@@ -26,10 +30,10 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
     x_name, y_name = output.curve or ("time", output.probes[0].name)
     figure, axes = _figure((7.0, 4.5))
     x, y = history[x_name], history[y_name]
-    axes.plot(x, y, color="#00204d", linewidth=1.5, label="warpsph")
+    axes.plot(x, y, color=DARK, linewidth=1.5, label="warpsph")
     if output.curve_reference:
         label, value = output.curve_reference
-        axes.axhline(value, color="#c26a00", linestyle="--", linewidth=1.2, label=f"{label}: {value:.5g}")
+        axes.axhline(value, color=BRIGHT, linestyle="--", linewidth=1.2, label=f"{label}: {value:.5g}")
         axes.legend(loc="best", frameon=False)
     axes.set_xlabel(_label(x_name, history.unit(x_name)))
     axes.set_ylabel(_label(y_name, history.unit(y_name)))
@@ -57,7 +61,7 @@ def plot_field(simulation: Simulation, path: Path) -> None:
 
 def _line(position, values, lattice, label) -> Figure:
     figure, axes = _figure((7.0, 4.0))
-    axes.plot(position[:, 0], values, color="#00204d", linewidth=1.2, marker=".", markersize=3)
+    axes.plot(position[:, 0], values, color=DARK, linewidth=1.2, marker=".", markersize=3)
     axes.set_xlabel("x [m]")
     axes.set_ylabel(label)
     axes.grid(alpha=0.3)
@@ -65,36 +69,75 @@ def _line(position, values, lattice, label) -> Figure:
 
 
 def _cells(position, values, lattice, label) -> Figure:
-    """Cells of the initial lattice, where they are now, with the nodes' values between them.
-
-    Colours span the middle 99 % of the values: a single node at a footing's edge would hide all others.
-    """
     extent = np.ptp(position, axis=0)
     wide = extent[0] > 1.5 * extent[1]
     figure, axes = _figure((8.0, 2.0 + 7.0 * extent[1] / extent[0]) if wide else (7.5, 6.5))
-    a, b, c, d = lattice.cells.T
-    triangles = np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
+    span = colour_span(values)
+    colours = draw_cells(axes, position, values, lattice, span)
+    place = {"location": "bottom" if wide else "right", "shrink": 0.8, "aspect": 30}
+    figure.colorbar(colours, ax=axes, label=label, extend=beyond(values, span), **place)
+    return figure
+
+
+def colour_span(values: np.ndarray) -> tuple[float, float]:
+    """The middle 99 % of the values: a single node at a footing's edge would hide all others.
+
+    From zero on where all values are positive and come near it.
+    """
     low, high = np.percentile(values, [0.5, 99.5])
-    beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    low = 0.0 if values.min() >= 0.0 and low < 0.2 * high else low
+    return float(low), float(high if high > low else low + 1.0)
+
+
+def beyond(values: np.ndarray, span: tuple[float, float]) -> str:
+    """On which sides values lie beyond a span of colours, as `Figure.colorbar` wants it."""
+    below, above = bool(values.min() < span[0]), bool(values.max() > span[1])
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
+        below, above
+    ]
+
+
+def draw_cells(
+    axes: Axes,
+    position: np.ndarray,
+    values: np.ndarray,
+    lattice: Lattice,
+    span: tuple[float, float],
+    mesh: bool = False,
+):
+    """Draw a plane body: the cells of its initial lattice where they are now, the nodes' values between them.
+
+    Args:
+        axes: where to draw; gets equal aspect and labels.
+        position: of the nodes [m], shape (n, 2).
+        values: at the nodes, shape (n,).
+        lattice: the initial lattice.
+        span: the values at the ends of the colour map.
+        mesh: whether to draw all cell edges; the outline only if not.
+
+    Returns: what `Figure.colorbar` needs.
+    """
+    corners, triangles, heights = split_cells(position, lattice.cells, values)
     colours = axes.tripcolor(
-        *position.T, triangles, values, shading="gouraud", cmap=COLOUR_MAP, vmin=low, vmax=high, rasterized=True
+        *corners.T,
+        triangles,
+        heights,
+        shading="gouraud",
+        cmap=COLOUR_MAP,
+        vmin=span[0],
+        vmax=span[1],
+        rasterized=True,
     )
+    if mesh:
+        around = position[lattice.cells[:, [0, 1, 3, 2]]]
+        axes.add_collection(PolyCollection(around, edgecolor="white", facecolor="none", linewidth=0.25, alpha=0.6))
     outline = PolyCollection(position[lattice.faces], edgecolor="black", facecolor="none", linewidth=0.6)
     axes.add_collection(outline)
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-    figure.colorbar(
-        colours,
-        ax=axes,
-        label=label,
-        extend=beyond[bool(values.min() < low), bool(values.max() > high)],
-        location="bottom" if wide else "right",
-        shrink=0.8,
-        aspect=30,
-    )
-    return figure
+    return colours
 
 
 def _surface(position, values, lattice, label) -> Figure:

@@ -1,0 +1,114 @@
+"""Vertical cut under a rigid footing: limit load and shear band (Blanc and Pastor 2012, section 6.5).
+
+A cut 10 m high and 10 m long, plane strain, von Mises, without gravity; a smooth rigid footing on its right half
+is pressed down with a velocity that grows linearly. Exact limit load, rate independent: 2 b Y0/√3 = 1154.7 N/m, by
+one straight band at 45° from the footing's left end to the middle of the cut. `--set hardening=-1e3` softens.
+"""
+
+import math
+
+import numpy as np
+
+from warpsph import (
+    Box,
+    Check,
+    EdgeForce,
+    Fixed,
+    Free,
+    Linear,
+    Output,
+    Parameter,
+    PerzynaVonMises,
+    PrescribedVelocity,
+    Probe,
+    Roller,
+    Scene,
+    edge,
+    fit_band,
+    where,
+)
+
+SIZE = (10.0, 10.0)
+WIDTH = 5.0  # of the footing [m]
+MECHANISM = (0.05, 0.15)  # settlements between which the mechanism stands and the shape has hardly changed [m]
+PAPER_STRAIN = 0.73  # largest ε̄ with H = 0
+
+NUMERICS = {"courant": 1.0}
+PARAMETERS = (
+    Parameter("spacing", 0.5, "m", "distance between neighbouring nodes"),
+    Parameter("acceleration", 3e-5, "m/s²", "rate at which the footing's velocity grows"),
+    Parameter("settlement", 0.45, "m", "settlement of the footing at the end"),
+    Parameter("young_modulus", 1e5, "Pa", "Young's modulus"),
+    Parameter("poisson_ratio", 0.35, "-", "Poisson's ratio"),
+    Parameter("density", 2000.0, "kg/m³", "density"),
+    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
+    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
+    Parameter("yield_size", 200.0, "Pa", "initial size of the von Mises surface Y0"),
+    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
+    Parameter("residual_ratio", 0.1, "-", "softening ends at this share of Y0 (our choice)"),
+)
+
+
+def limit_load(p):
+    """Exact limit load [N per metre]."""
+    return 2.0 * WIDTH * p.yield_size / math.sqrt(3.0)
+
+
+def scene(p):
+    footing = edge("top") & where(lambda x, y: x >= SIZE[0] - WIDTH)
+    beside = edge("top") & where(lambda x, y: x < SIZE[0] - WIDTH)
+    return Scene(
+        shape=Box(SIZE, p.spacing),
+        material=PerzynaVonMises(
+            young_modulus=p.young_modulus,
+            poisson_ratio=p.poisson_ratio,
+            density=p.density,
+            fluidity=p.fluidity,
+            exponent=p.exponent,
+            yield_size=p.yield_size,
+            hardening=p.hardening,
+            residual_ratio=p.residual_ratio,
+        ),
+        conditions=[
+            Roller(edge("left")),
+            Fixed(edge("bottom")),
+            Free(edge("right")),
+            PrescribedVelocity(footing, (None, Linear(-p.acceleration))),
+            Roller(beside),
+        ],
+        duration=math.sqrt(2.0 * p.settlement / p.acceleration),
+        numerics=p.numerics,
+        output=Output(
+            probes=(
+                Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node(SIZE), 1]),
+                Probe("load", "N", EdgeForce(footing, axis=1)),
+            ),
+            curve=("settlement", "load"),
+            curve_reference=("exact limit load", limit_load(p)),
+            field="equivalent_plastic_strain",
+        ),
+    )
+
+
+def band(lattice, strain):
+    """The shear band, fitted to the strain ε̄ (n,) of the interior nodes where they were initially.
+
+    Edge nodes are left out: ε̄ there alternates from node to node at the free edge and peaks at the footing's end.
+    """
+    inside = ~edge("boundary").nodes(lattice)
+    return fit_band(lattice.nodes[inside], strain[inside])
+
+
+def checks(run):
+    p, load, settlement = run.parameters, run.history["load"], run.history["settlement"]
+    strain = run.simulation.field("equivalent_plastic_strain")
+    angle = Check("band_angle", abs(band(run.simulation.lattice, strain).angle), 45.0, "°", 3.0, relative=False)
+    if p.hardening < 0.0:
+        left = float(load[-1] / load.max())
+        return [angle, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
+    formed = (settlement >= MECHANISM[0]) & (settlement <= MECHANISM[1])
+    return [
+        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N", bound=0.10, bound_below=0.02),
+        angle,
+        Check("largest_strain", float(strain.max()), PAPER_STRAIN, "-", 0.20),
+    ]
