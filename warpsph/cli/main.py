@@ -55,8 +55,8 @@ def _parser() -> argparse.ArgumentParser:
     reporting = commands.add_parser(
         "report",
         help="run every case of the paper and lay it out beside the paper's and the exact results",
-        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call of "
-        "this version with these parameters has finished are kept; delete a run's folder to repeat it.",
+        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call "
+        "of this version with these parameters has finished are kept; delete a run's folder to repeat it.",
     )
     reporting.add_argument("--quick", action="store_true", help="coarser and shorter where a case takes minutes")
     reporting.add_argument(

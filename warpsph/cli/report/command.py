@@ -36,8 +36,8 @@ def report(folder: Path, *, quick: bool, device: str | None, jobs: int, quiet: b
         sections.append(case.tell(found, lambda name, case=case: figures / f"{case.name}_{name}.png"))
     seconds = sum(result.seconds for result in results)
     lead = [
-        "T. Blanc, M. Pastor, A stabilized Runge-Kutta, Taylor smoothed particle hydrodynamics algorithm for large "
-        "deformation problems in dynamics, Int. J. Numer. Meth. Engng (2012), doi:10.1002/nme.4324.",
+        "T. Blanc, M. Pastor, A stabilized Runge-Kutta, Taylor smoothed particle hydrodynamics algorithm for "
+        "large deformation problems in dynamics, Int. J. Numer. Meth. Engng (2012), doi:10.1002/nme.4324.",
         f"Every case by warpsph {__version__}, float64 on {results[0].summary['device_name']}, by the published "
         f"velocity step unless said; {len(results)} runs, {seconds:.0f} s of run time. "
         + ("**Quick form:** the slope is coarser and shorter, the finest spacings are left out. " if quick else "")

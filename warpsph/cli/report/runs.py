@@ -63,10 +63,11 @@ class Run:
                 asked = file["asked"].tolist()
         except (OSError, ValueError, KeyError):
             return False
+        file, _, values = self.build()
         return (
             summary["warpsph_version"] == __version__
-            and summary["scene"] == self.scene
-            and summary["parameters"] == json.loads(json.dumps(self.build()[2]))
+            and summary["scene"] == file.name
+            and summary["parameters"] == json.loads(json.dumps(values))
             and asked == list(self.frames)
         )
 

@@ -61,8 +61,8 @@ def tell(results, picture) -> Section:
     pictures.append(
         Picture(
             _figure11(bar, picture("11")),
-            "Fig. 11: the deformed bar in time (displacements × 20); every second node, those from the middle of the "
-            "bar in orange with the space they sweep.",
+            "Fig. 11: the deformed bar in time (displacements × 20); every second node, those from the middle of "
+            "the bar in orange with the space they sweep.",
         )
     )
     sigma = p.density * speed * p.velocity

@@ -69,8 +69,8 @@ def tell(results, picture) -> Section:
             Picture(
                 _held(named, standard[0][0], first, p, picture("held")),
                 "The held block. Top left, in tension: departure from the lattice, which grows when nodes clump. "
-                "Top right, without stress: checkerboard of the velocity, the hourglass mode. Bottom: the nodes in "
-                "tension after 20 ms.",
+                "Top right, without stress: checkerboard of the velocity, the hourglass mode. Bottom: the nodes "
+                "in tension after 20 ms.",
             ),
             Picture(
                 _released(published, picture("released")),
@@ -103,8 +103,8 @@ def _held_tables(named, module, p) -> list[Table]:
             lines(lambda history: float(history["smallest_distance"].min() / p.spacing)),
         ),
         Table(
-            "Hourglass: checkerboard of the velocity after 20 ms over the start's (under stress, clumping alternates "
-            "too):",
+            "Hourglass: checkerboard of the velocity after 20 ms over the start's (under stress, clumping "
+            "alternates too):",
             ("held block", *STRAINS),
             lines(lambda history: float(history["checkerboard"][-1] / history["checkerboard"][0])),
         ),
