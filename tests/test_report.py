@@ -126,6 +126,7 @@ def test_wavy_surface_runs_both_normals_and_every_body():
     assert settings == [(), ("normals=marrone",), *bodies]
 
 
+@pytest.mark.parametrize("module", [hanging_bar, elastic_bar, wavy_surface])
 def test_short_cases_are_told(module, tmp_path):
     """From the runs to the section: figures drawn, every difference has its paragraph."""
     case = module.case(quick=True)
