@@ -12,7 +12,7 @@ from warpsph import (
     BodyForce,
     Box,
     Check,
-    Free,
+    FreeSurface,
     NodeValue,
     Output,
     Parameter,
@@ -44,8 +44,6 @@ PARAMETERS = (
 
 
 def scene(p):
-    walls = [Roller(edge("left")), Roller(edge("bottom"))]
-    surface = [Free(edge("right")), Free(edge("top"))]
     return Scene(
         shape=Box(SIZE, p.spacing),
         material=PerzynaVonMises(
@@ -57,7 +55,8 @@ def scene(p):
             yield_size=p.yield_size,
             hardening=p.hardening,
         ),
-        conditions=walls + surface,
+        conditions=[Roller(edge("left")), Roller(edge("bottom"))],
+        free_surface=FreeSurface(),
         body_force=BodyForce((0.0, -9.81), Ramp(1.0)),
         damping=p.damping,
         duration=p.duration,

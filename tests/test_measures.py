@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpsph import Box, Check, Sampler, checkerboard_amplitude, fit_band, growth_rate, smallest_distance, trace_ridge
+from warpsph import (
+    Box,
+    Check,
+    Sampler,
+    checkerboard_amplitude,
+    fit_band,
+    growth_rate,
+    smallest_distance,
+    trace_ridge,
+)
 from warpsph.simulation.measures import band_profile, checkerboard, split_cells, width_at_half
 
 

@@ -105,7 +105,7 @@ def test_only_missing_runs_are_made(bar, tmp_path, capsys):
 
 @pytest.mark.parametrize("quick", [False, True])
 def test_every_case_has_runs_that_can_be_built(quick):
-    """Names are those of folders, so they differ; settings are those the scenes take; frames lie within the run."""
+    """Names are folders, so they differ; settings are those the scenes take; frames lie within the run."""
     runs = [run for case in cases(quick) for run in case.runs]
     assert len({run.name for run in runs}) == len(runs)
     for run in runs:
@@ -119,14 +119,14 @@ def test_quick_form_is_a_tenth_of_the_work():
     assert quick < 0.2 * full
 
 
-def test_wavy_surface_is_told_once_its_scene_exists(monkeypatch):
-    monkeypatch.setattr(wavy_surface, "shipped", lambda: {})
-    assert wavy_surface.case(quick=False) is None
-    monkeypatch.setattr(wavy_surface, "shipped", lambda: {"wavy_surface": None})
-    assert [run.scene for run in wavy_surface.case(quick=False).runs] == ["wavy_surface"]
+def test_wavy_surface_runs_both_normals_and_every_body():
+    """The paper's figure 4 shows both normals; the staircase stands beside the bodies with exact ones."""
+    settings = [run.settings for run in wavy_surface.case(quick=False).runs]
+    bodies = [(f"body={body}",) for body in ("disc", "ellipse", "staircase")]
+    assert settings == [(), ("normals=marrone",), *bodies]
 
 
-@pytest.mark.parametrize("module", [hanging_bar, elastic_bar])
+@pytest.mark.parametrize("module", [hanging_bar, elastic_bar, wavy_surface])
 def test_short_cases_are_told(module, tmp_path):
     """From the runs to the section: figures drawn, every difference has its paragraph."""
     case = module.case(quick=True)
@@ -142,7 +142,7 @@ def test_short_cases_are_told(module, tmp_path):
 
 
 def test_dalembert_has_the_plateaus_of_the_bar():
-    """x = 0.1 m, c = 200 m/s: fronts at 4.5, 5.5, 9.5, 10.5 ms; v = 0, 1, 0, −1, 0 and σ = 0, 4, 8, 4, 0 (1e5 Pa)."""
+    """x = 0.1 m, c = 200 m/s: fronts at 4.5, 5.5, 9.5, 10.5 ms; v = 0, 1, 0, −1, 0; σ = 0, 4, 8, 4, 0 (1e5 Pa)."""
     t = np.array([4.0, 5.0, 7.5, 10.0, 12.5, 15.0]) * 1e-3
     v, stress, u = elastic_bar.dalembert(0.1, t, 1.0, 200.0, 1.0, 2000.0 * 200.0)
     np.testing.assert_allclose(v, [0.0, 1.0, 0.0, -1.0, 0.0, 1.0])

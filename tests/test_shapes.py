@@ -15,6 +15,7 @@ BAR = Box((1.0,), 0.1)
 PLATE = Box((2.0, 1.0), 0.25)
 BLOCK = Box((1.0, 0.5, 0.75), 0.25, origin=(-1.0, 2.0, 0.5))
 ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], 0.25)
+CHANNEL = Polygon([(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)], 0.25)
 
 
 def quarter_ring(x, y):
@@ -32,6 +33,7 @@ SHAPES = {
     "block": BLOCK,
     "disc": Disc(1.0, 0.25, centre=(3.0, -1.0)),
     "ell": ELL,
+    "channel": CHANNEL,
     "rotated plate": PLATE.rotated(0.7, about=(1.0, 2.0)),
     "rotated block": BLOCK.rotated(-2.0),
     "ring": RING,
@@ -125,10 +127,11 @@ def test_disc_area_approaches_the_circle():
     assert volumes.sum() == pytest.approx(math.pi, abs=0.02)
 
 
-def test_polygon_with_lattice_sides_has_its_area_and_outline():
-    lattice = ELL.lattice()
-    assert lattice.cell_volumes().sum() == pytest.approx(3.0, rel=1e-12)
-    assert face_areas(lattice.nodes[lattice.faces]).sum() == pytest.approx(8.0, rel=1e-12)
+@pytest.mark.parametrize(("polygon", "area", "outline"), [(ELL, 3.0, 8.0), (CHANNEL, 5.0, 12.0)])
+def test_polygon_with_lattice_sides_has_its_area_and_outline(polygon, area, outline):
+    lattice = polygon.lattice()
+    assert lattice.cell_volumes().sum() == pytest.approx(area, rel=1e-12)
+    assert face_areas(lattice.nodes[lattice.faces]).sum() == pytest.approx(outline, rel=1e-12)
     assert (1.25, 1.25) not in points(lattice.nodes)
 
 

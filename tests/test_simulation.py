@@ -68,7 +68,7 @@ def test_history_has_every_step_and_survives_in_its_file(tmp_path):
     simulation = Simulation(bar(), device="cpu")
     history = History(simulation, tmp_path / "history.csv")
     simulation.run(observers=[history])
-    history.close()
+    # not closed: a run that is killed leaves the rows it had
     lines = (tmp_path / "history.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "step [-],time [s],v [m/s]"
     assert len(lines) == simulation.steps + 2

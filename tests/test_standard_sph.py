@@ -41,7 +41,7 @@ def test_linear_and_angular_momentum_are_kept():
 
 
 def test_alternating_modes_grow_at_the_rate_of_linear_theory():
-    """Away from the edge a small alternating displacement u is accelerated by s² u; the fastest of all such modes."""
+    """Away from the edge a small alternating displacement u is accelerated by s² u; the fastest mode."""
     stress, amplitude, fastest = 1e6, 1e-7, 0.0
     for i, j in ((1, 0), (0, 1), (1, 1)):
         for axis in (0, 1):

@@ -11,7 +11,7 @@ from warpsph.ground.precision import PRECISIONS
 from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
 from warpsph.nodes.neighbours import PairList
 from warpsph.nodes.node_sets import node_types
-from warpsph.operators.sources import SOURCE_SCHEMES as SOURCE_TABLE
+from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
 from warpsph.operators.sweep import sweep
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
 from warpsph.scene.material import Elastic as ElasticMaterial

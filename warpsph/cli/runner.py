@@ -18,6 +18,7 @@ from ..simulation.history import History
 from ..simulation.plots import plot_field, plot_history
 from ..simulation.simulation import Observer, Simulation
 from ..simulation.summary import summarise, write_json
+from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
 
@@ -46,9 +47,9 @@ def run(
     `watching` makes further observers of the simulation; they are closed before the summary is written.
     """
     say = (lambda text: None) if quiet else print
-    folder = writable(folder)
     start = clock.perf_counter()
     simulation = Simulation(scene, device=device, precision=precision)
+    folder = writable(folder)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
@@ -88,6 +89,8 @@ def run(
     if error is None:
         plot_field(simulation, folder / "field.png")
         pictures.append("field.png")
+        if plot_surface(simulation, folder / "surface.png"):
+            pictures.append("surface.png")
     say(
         f"{simulation.steps} steps to t = {simulation.time:.6g} s in {wall_time:.1f} s, "
         f"{summary['node_steps_per_second']:.3g} node-steps/s"

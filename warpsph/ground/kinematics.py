@@ -24,6 +24,7 @@ class Kinematics:
         spin: (σ, L) → ω σ − σ ω (Jaumann).
         von_mises: σ → q = √(3 J₂); |σ| in a bar.
         relaxation: (σ, q, G, E) → Dₑ : ∂q/∂σ = 3 G s/q; E σ/q in a bar.
+        transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
     """
 
     elastic_rate: wp.Function
@@ -31,6 +32,7 @@ class Kinematics:
     spin: wp.Function
     von_mises: wp.Function
     relaxation: wp.Function
+    transform: wp.Function
 
 
 @cache
@@ -64,7 +66,11 @@ def _bar(precision: Precision) -> Kinematics:
     def relaxation(sigma: stress, q: real, shear: real, young: real):
         return (young / q) * sigma
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation)
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        return P[0, 0] * sigma * P[0, 0]
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 def _plane_strain(precision: Precision) -> Kinematics:
@@ -106,7 +112,12 @@ def _plane_strain(precision: Precision) -> Kinematics:
         deviator = stress(sigma[0] - mean, sigma[1] - mean, sigma[2], sigma[3] - mean)
         return (real(3.0) * shear / q) * deviator
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation)
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * wp.transpose(P)
+        return stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 def _solid(precision: Precision) -> Kinematics:
@@ -155,7 +166,11 @@ def _solid(precision: Precision) -> Kinematics:
         deviator = stress(sigma[0] - mean, sigma[1] - mean, sigma[2] - mean, sigma[3], sigma[4], sigma[5])
         return (real(3.0) * shear / q) * deviator
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation)
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        return stored(P * tensor(sigma) * wp.transpose(P))
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
 
 
 _KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import numpy as np
 import warp as wp
 
 from .precision import Precision
@@ -53,3 +54,28 @@ def determinant_of(dim: int, precision: Precision) -> wp.Function:
             return wp.determinant(a)
 
     return determinant
+
+
+@cache
+def rotation_of(dim: int, precision: Precision) -> wp.Function:
+    """(L, Δt) → R = exp(ω Δt), ω the skew part of L, by Rodrigues' formula, in the plane as in space.
+
+    R = 1 + (sin θ/θ) K + ((1 − cos θ)/θ²) K² with K = ω Δt, θ² = −tr(K²)/2; the series' first terms at small θ.
+    """
+    real, matrix = precision.real, precision.mat(dim, dim)
+    identity = matrix(np.eye(dim))
+
+    @wp.func
+    def rotation(L: matrix, dt: real):
+        K = (real(0.5) * dt) * (L - wp.transpose(L))
+        K2 = K * K
+        theta2 = real(-0.5) * wp.trace(K2)
+        first = real(1.0) - theta2 / real(6.0)
+        second = real(0.5) - theta2 / real(24.0)
+        if theta2 > real(1e-4):
+            theta = wp.sqrt(theta2)
+            first = wp.sin(theta) / theta
+            second = (real(1.0) - wp.cos(theta)) / theta2
+        return identity + first * K + second * K2
+
+    return rotation

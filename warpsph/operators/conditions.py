@@ -1,7 +1,6 @@
 """Boundary conditions on the material nodes, as resolved by `warpsph.scene.boundary`.
 
-Moving free surfaces, detected as the body deforms, will be one more object with the method `apply` beside
-`Conditions`; edges given by selection are all in here.
+Edges given by selection are all in here; a free surface that moves is added by `warpsph.operators.free_surface`.
 """
 
 from dataclasses import dataclass
@@ -67,15 +66,21 @@ class Conditions:
     Args:
         boundary: the resolved conditions.
         n: number of material nodes.
+
+    Attributes:
+        types: types of the table and its function.
+        table: the conditions, for `types.apply`.
+        kernels: the kernels that apply them.
     """
 
     def __init__(
         self, boundary: BoundaryTable, n: int, continuum: Continuum, precision: Precision, device: wp.Device
     ):
         types = node_types(continuum, precision)
-        self.table = condition_types(continuum, precision).Table()
+        self.types = condition_types(continuum, precision)
+        self.table = self.types.Table()
         self._functions = boundary.functions
-        self._kernel = _apply_kernel(continuum, precision)
+        self._kernel = apply_kernel(continuum, precision, self.types)
         self.kernels = (self._kernel,)
         row = np.full(n, -1, dtype=np.int32)
         row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
@@ -95,12 +100,18 @@ class Conditions:
         if terms:
             table.amplitude.assign(boundary.amplitude)
             table.function.assign(boundary.function)
-        table.drive = wp.zeros(max(1, len(self._functions)), dtype=precision.real, device=device)
+        table.drive = self._drive = wp.zeros(max(1, len(self._functions)), dtype=precision.real, device=device)
 
     def set_time(self, t: float) -> None:
         """Evaluate the prescribed velocities at time t [s]."""
         if self._functions:
-            self.table.drive.assign([f(t) if callable(f) else f for f in self._functions])
+            self._drive.assign([f(t) if callable(f) else f for f in self._functions])
+
+    def locate(self, nodes) -> None:
+        """Nothing: all conditions are on nodes chosen once and for all."""
+
+    def follow(self, nodes, dt: float) -> None:
+        """Nothing."""
 
     def apply(self, nodes, t: float, step: int, health: wp.array) -> None:
         """Step 13: impose the conditions at time t on the nodes, in place, and note the first non-finite node.
@@ -121,9 +132,10 @@ class Conditions:
 
 
 @cache
-def _apply_kernel(continuum: Continuum, precision: Precision):
-    types, conditions = node_types(continuum, precision), condition_types(continuum, precision)
-    Table, apply, MaterialNodes = conditions.Table, conditions.apply, types.MaterialNodes
+def apply_kernel(continuum: Continuum, precision: Precision, conditions: ConditionTypes):
+    """The kernel of step 13."""
+    MaterialNodes = node_types(continuum, precision).MaterialNodes
+    Table, apply = conditions.Table, conditions.apply
 
     @wp.kernel(module="unique", enable_backward=False)
     def apply_conditions(table: Table, step: int, nodes: MaterialNodes, health: wp.array(dtype=wp.int32)):

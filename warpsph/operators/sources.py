@@ -1,8 +1,12 @@
 """The source part L(Δt/2) of steps 1-2 and 11-12: viscoplastic flow, spin, body force and damping at the nodes.
 
 The velocity's sources (b − c v) and the stress's (flow, spin) do not touch each other, so each is integrated on
-its own by the classical fourth-order Runge-Kutta scheme. The stress's is sub-stepped, node by node, so that
-λ Δt stays below `STIFFNESS_LIMIT`, λ being the rate at which flow relaxes the stress there.
+its own: the velocity's by the classical fourth-order Runge-Kutta scheme, the stress's by the scheme of choice:
+
+- `rk4`: the same, sub-stepped node by node so that λ Δt stays below `STIFFNESS_LIMIT`, λ being the rate at which
+  flow relaxes the stress there;
+- `analytic`: the rotation exp(ω Δt) and the law's own solution. Flow is isotropic, so the two commute, and there
+  is no limit to the step: γ → ∞ gives rate-independent plasticity.
 """
 
 from dataclasses import dataclass
@@ -12,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.linear_algebra import rotation_of
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
@@ -36,24 +41,26 @@ class NoSources:
 
 
 class Sources:
-    """RK4 sources of a scene.
+    """The sources of a scene.
 
     Args:
         scene: the scene.
         law: its material law, with the filled `parameters`.
+        integrator: one of `STRESS_INTEGRATORS`.
     """
 
-    def __init__(self, scene: Scene, law: Law, parameters, precision: Precision):
+    def __init__(self, scene: Scene, law: Law, parameters, precision: Precision, integrator):
         continuum = scene.lattice.continuum
         self._parameters = parameters
         self._body_force = scene.body_force or (lambda t: np.zeros(continuum.dim))
         self._damping = scene.damping
         self._vector = precision.vec(continuum.dim)
-        self._kernel = rk4_kernel(
+        flows, turns = law.flow is not None, spins(scene)
+        self._kernel = source_kernel(
             continuum,
             precision,
             law,
-            spins=spins(scene),
+            integrator(continuum, precision, law, turns) if flows or turns else None,
             accelerates=scene.body_force is not None or scene.damping > 0.0,
         )
         self.kernels = (self._kernel,)
@@ -80,29 +87,46 @@ def spins(scene: Scene) -> bool:
     return scene.large_displacements and scene.lattice.dim > 1
 
 
-def rk4_sources(scene: Scene, law: Law, parameters, precision: Precision) -> Sources | NoSources:
-    """The sources of a scene by RK4; an object that does nothing when it has none."""
+def sources(scene: Scene, law: Law, parameters, precision: Precision) -> Sources | NoSources:
+    """The sources of a scene by the scheme it names; an object that does nothing when it has none."""
     if law.flow is None and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
         return NoSources()
-    return Sources(scene, law, parameters, precision)
+    return Sources(scene, law, parameters, precision, STRESS_INTEGRATORS[scene.numerics.source_scheme])
 
 
-SOURCE_SCHEMES = {"rk4": rk4_sources}
+def history_type(law: Law, precision: Precision) -> type:
+    """Vector of a law's internal variables; Warp has no empty vectors, so one spare zero where there are none."""
+    return precision.vec(max(len(law.history), 1))
 
 
 @cache
-def rk4_kernel(continuum: Continuum, precision: Precision, law: Law, spins: bool, accelerates: bool):
-    """The kernel that applies the sources the flags ask for, and no others."""
-    m = len(law.history)
-    types, kin = node_types(continuum, precision), kinematics(continuum, precision)
-    phi = unknowns(continuum, precision)
-    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    real, vector, stress, tensor = precision.real, types.vector, types.stress, types.tensor
-    Parameters, MaterialNodes = law.Parameters, types.MaterialNodes
-    size = max(m, 1)  # Warp has no empty vectors: a law without history gets a spare one that stays zero
-    internal = precision.vec(size)
-    spin, flow, flow_stiffness = kin.spin, law.flow, law.flow_stiffness
-    flows = flow is not None
+def analytic(continuum: Continuum, precision: Precision, law: Law, spins: bool) -> wp.Function:
+    """(σ, history, L, material, Δt) → (σ, history): exact rotation, and the law's relaxation where it has flow."""
+    types, internal = node_types(continuum, precision), history_type(law, precision)
+    real, Parameters = precision.real, law.Parameters
+    rotation = rotation_of(continuum.dim, precision)
+    transform, relax, flows = kinematics(continuum, precision).transform, law.relax, law.flow is not None
+
+    @wp.func
+    def advance(sigma: types.stress, history: internal, L: types.tensor, material: Parameters, dt: real):
+        result = sigma
+        internals = history
+        if wp.static(spins):
+            result = transform(result, rotation(L, dt))
+        if wp.static(flows):
+            result, internals = relax(result, internals, material, dt)
+        return result, internals
+
+    return advance
+
+
+@cache
+def rk4(continuum: Continuum, precision: Precision, law: Law, spins: bool) -> wp.Function:
+    """(σ, history, L, material, Δt) → (σ, history) by RK4, sub-stepped as the stiffness of the flow asks."""
+    types, internal = node_types(continuum, precision), history_type(law, precision)
+    real, stress, tensor = precision.real, types.stress, types.tensor
+    spin, Parameters = kinematics(continuum, precision).spin, law.Parameters
+    flow, flow_stiffness, flows = law.flow, law.flow_stiffness, law.flow is not None
 
     @wp.func
     def stress_rate(sigma: stress, history: internal, L: tensor, material: Parameters):
@@ -136,6 +160,38 @@ def rk4_kernel(continuum: Continuum, precision: Precision, law: Law, spins: bool
             return left
 
     @wp.func
+    def advance(sigma: stress, history: internal, L: tensor, material: Parameters, dt: real):
+        result = sigma
+        internals = history
+        left = dt
+        while left > real(0.0):
+            part = substep(result, internals, material, left)
+            result, internals = rk4_stress(result, internals, L, material, part)
+            left = left - part
+        return result, internals
+
+    return advance
+
+
+STRESS_INTEGRATORS = {"rk4": rk4, "analytic": analytic}
+
+
+@cache
+def source_kernel(
+    continuum: Continuum,
+    precision: Precision,
+    law: Law,
+    advance_stress: wp.Function | None,
+    accelerates: bool,
+):
+    """The kernel that applies the sources a scene has, and no others."""
+    m, acts_on_stress = len(law.history), advance_stress is not None
+    types, phi = node_types(continuum, precision), unknowns(continuum, precision)
+    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
+    real, vector, internal = precision.real, types.vector, history_type(law, precision)
+    Parameters, MaterialNodes = law.Parameters, types.MaterialNodes
+
+    @wp.func
     def rk4_velocity(v: vector, b0: vector, b1: vector, b2: vector, c: real, dt: real):
         half = real(0.5) * dt
         v1 = b0 - c * v
@@ -161,16 +217,11 @@ def rk4_kernel(continuum: Continuum, precision: Precision, law: Law, spins: bool
         sigma = stress_of(point.phi)
         if wp.static(accelerates):
             v = rk4_velocity(v, body_force_start, body_force_middle, body_force_end, damping, dt)
-        if wp.static(flows or spins):
+        if wp.static(acts_on_stress):
             internals = internal()
             if wp.static(m > 0):
                 internals = history[i]
-            L = nodes.velocity_gradient[i]
-            left = dt
-            while left > real(0.0):
-                part = substep(sigma, internals, material, left)
-                sigma, internals = rk4_stress(sigma, internals, L, material, part)
-                left = left - part
+            sigma, internals = advance_stress(sigma, internals, nodes.velocity_gradient[i], material, dt)
             if wp.static(m > 0):
                 history[i] = internals
         nodes.point[i].phi = join(v, sigma)

@@ -4,6 +4,7 @@ from .boundary import BoundaryTable
 from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from .dimension import BAR, CONTINUA, PLANE_STRAIN, SOLID, Continuum
+from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .lattice import Lattice
 from .material import Elastic, PerzynaVonMises
@@ -33,6 +34,7 @@ __all__ = [
     "Elastic",
     "Fixed",
     "Free",
+    "FreeSurface",
     "Lattice",
     "Linear",
     "Mapped",

@@ -96,10 +96,13 @@ def resolve(lattice: Lattice, conditions: Sequence[Condition]) -> BoundaryTable:
 
     width = max((len(parts) for parts in terms.values()), default=0)
     amplitude = np.zeros((len(nodes), width, dim))
-    function = np.zeros((len(nodes), width), dtype=np.int32)
+    spare = len(functions)  # short rows end in a constant zero, since zero times a drive that is NaN is NaN
+    function = np.full((len(nodes), width), spare, dtype=np.int32)
     for row, parts in terms.items():
         for k, (vector, index) in enumerate(parts):
             amplitude[row, k], function[row, k] = vector, index
+    if (function == spare).any():
+        functions.append(0.0)
     return BoundaryTable(nodes, projectors, stress, tuple(functions), amplitude, function, moved)
 
 

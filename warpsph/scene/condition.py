@@ -58,13 +58,8 @@ class Fixed(Condition):
 
 
 @dataclass(frozen=True)
-class Roller(Condition):
-    """A frictionless wall at rest: no normal velocity, no tangential traction.
-
-    Args:
-        on: the nodes.
-        normal: the wall's normal; that of the boundary faces unless given.
-    """
+class EdgeCondition(Condition):
+    """A condition that needs an outward normal: that of the boundary faces unless given."""
 
     normal: tuple[float, ...] | None = None
 
@@ -76,11 +71,21 @@ class Roller(Condition):
     def takes_normal(self) -> bool:
         return True
 
-    def rows(self, points, normal):
-        return [(np.broadcast_to(normal, points.shape), [])]
-
     def check(self, dim):
         _check_normal(self, dim)
+
+
+@dataclass(frozen=True)
+class Roller(EdgeCondition):
+    """A frictionless wall at rest: no normal velocity, no tangential traction.
+
+    Args:
+        on: the nodes.
+        normal: the wall's normal; that of the boundary faces unless given.
+    """
+
+    def rows(self, points, normal):
+        return [(np.broadcast_to(normal, points.shape), [])]
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,7 @@ class Rotating(Condition):
 
 
 @dataclass(frozen=True)
-class Free(Condition):
+class Free(EdgeCondition):
     """A traction-free edge: σ n = 0, with the initial outward normal n.
 
     Args:
@@ -171,21 +176,8 @@ class Free(Condition):
         normal: the edge's normal; that of the boundary faces unless given.
     """
 
-    normal: tuple[float, ...] | None = None
-
-    def __post_init__(self):
-        super().__post_init__()
-        _store_normal(self)
-
-    @property
-    def takes_normal(self) -> bool:
-        return True
-
     def rows(self, points, normal):
         return []
-
-    def check(self, dim):
-        _check_normal(self, dim)
 
 
 @dataclass(frozen=True)
@@ -212,7 +204,7 @@ def _axis(points: np.ndarray, axis: int) -> np.ndarray:
     return np.broadcast_to(np.eye(points.shape[1])[axis], points.shape)
 
 
-def _store_normal(condition: Roller | PrescribedVelocity | Free) -> None:
+def _store_normal(condition: EdgeCondition | PrescribedVelocity) -> None:
     if condition.normal is None:
         return
     name = f"{type(condition).__name__}.normal"
@@ -223,7 +215,7 @@ def _store_normal(condition: Roller | PrescribedVelocity | Free) -> None:
     object.__setattr__(condition, "normal", tuple(part / length for part in normal))
 
 
-def _check_normal(condition: Roller | PrescribedVelocity | Free, dim: int) -> None:
+def _check_normal(condition: EdgeCondition | PrescribedVelocity, dim: int) -> None:
     if condition.normal is not None and len(condition.normal) != dim:
         name = f"{type(condition).__name__}.normal"
         raise SceneError(name, condition.normal, f"it needs {dim} components")

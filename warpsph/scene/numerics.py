@@ -29,7 +29,7 @@ KERNELS = {
     "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
 }
 VELOCITY_SCHEMES = ("blanc-pastor", "taylor")
-SOURCE_SCHEMES = ("rk4",)
+SOURCE_SCHEMES = ("rk4", "analytic")
 LARGEST_SUPPORT = 6.0
 
 
@@ -42,7 +42,7 @@ class Numerics:
         smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given.
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
         velocity_scheme: `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the complete scheme).
-        source_scheme: `rk4` (sub-stepped where stiff).
+        source_scheme: `rk4` (sub-stepped where stiff) or `analytic` (no limit to the step).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
     """
 

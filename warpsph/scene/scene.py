@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import SceneError
 from .boundary import BoundaryTable, resolve
-from .condition import Condition
+from .condition import Condition, Free
+from .free_surface import FreeSurface
 from .lattice import Lattice
 from .material import Elastic
 from .numerics import Numerics
@@ -58,6 +59,7 @@ class Scene:
         material: `Elastic` or `PerzynaVonMises`.
         duration: simulated time [s].
         conditions: boundary conditions; an edge without one keeps whatever traction it has.
+        free_surface: frees the edge that no condition moves of its tractions, as it moves and deforms; or None.
         body_force: uniform body force, or None.
         damping: mass-proportional damping c [1/s]: dv/dt = … − c v.
         velocity: initial velocity [m/s], a function of position f(x, y, …) → one part an axis; rest unless given.
@@ -77,6 +79,7 @@ class Scene:
     material: Elastic
     duration: float
     conditions: tuple[Condition, ...] = ()
+    free_surface: FreeSurface | None = None
     body_force: BodyForce | None = None
     damping: float = 0.0
     velocity: Callable | None = None
@@ -104,8 +107,22 @@ class Scene:
         if self.body_force is not None:
             instance("body_force", self.body_force, BodyForce, "BodyForce(…) or None")
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
+        if self.free_surface is not None:
+            self._check_free_surface()
         self.numerics.check_support(self.lattice.continuum, self.lattice.largest_edge() / self.lattice.spacing)
         _ = self.boundary, self.initial_velocity, self.initial_stress
+
+    def _check_free_surface(self) -> None:
+        surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
+        surface.check(self.lattice.dim)
+        for index, condition in enumerate(self.conditions):
+            if isinstance(condition, Free):
+                allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
+                raise SceneError(f"conditions[{index}]", condition, allowed)
+        if not len(surface.candidates(self.lattice, self.boundary)):
+            raise SceneError(
+                "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
+            )
 
     @cached_property
     def lattice(self) -> Lattice:

@@ -34,6 +34,10 @@ def _has_yield(scene) -> bool:
     return isinstance(scene.material, PerzynaVonMises)
 
 
+def _has_free_surface(scene) -> bool:
+    return scene.free_surface is not None
+
+
 def _phi(simulation) -> np.ndarray:
     return simulation.nodes.point.numpy()["phi"]
 
@@ -89,6 +93,20 @@ FIELDS: dict[str, Field] = {
     ),
     "velocity_gradient": Field(
         "1/s", "(n, d, d)", "L = ∂v_i/∂x_j of v^{n+1/2}", lambda s: s.nodes.velocity_gradient.numpy().copy()
+    ),
+    "free_surface": Field(
+        "-",
+        "(n,)",
+        "whether the node is on the free surface, not under a velocity condition",
+        lambda s: s.conditions.on_surface(),
+        _has_free_surface,
+    ),
+    "surface_normal": Field(
+        "-",
+        "(n, d)",
+        "outward unit normal of the free surface, zero elsewhere",
+        lambda s: s.conditions.normals(),
+        _has_free_surface,
     ),
     "mass": Field(
         "kg",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +41,8 @@ class History:
         """Sample when the interval has passed."""
         if simulation.time < self._next * (1.0 - 1e-9):
             return
-        while self._interval > 0.0 and self._next <= simulation.time * (1.0 + 1e-9):
-            self._next += self._interval
+        if self._interval > 0.0:
+            self._next = (math.floor(simulation.time / self._interval * (1.0 + 1e-9)) + 1) * self._interval
         self.sample(simulation)
 
     def sample(self, simulation: Simulation) -> None:

@@ -11,6 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from ..scene.lattice import Lattice
+from ..scene.output import component
 from .fields import FIELDS
 from .history import History
 from .measures import split_cells
@@ -45,11 +46,11 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
 def plot_field(simulation: Simulation, path: Path) -> None:
     """Draw the scene's field at the present time, on the deformed nodes, into a PNG."""
     output, lattice = simulation.scene.output, simulation.lattice
-    values = simulation.field(output.field)
+    values = simulation.field(output.field).astype(float)
     name = output.field
     if values.ndim > 1:
-        values = values[:, output.component]
-        name = f"{name} {_component(output.field, output.component, lattice.continuum)}"
+        name = f"{name} {_component(values, output.field, output.component, lattice.continuum)}"
+        values = component("Output", values, output.component)
     position = simulation.field("position")
     label = _label(name, FIELDS[output.field].unit)
     draw = {1: _line, 2: _cells, 3: _surface}[lattice.dim]
@@ -163,5 +164,8 @@ def _label(name: str, unit: str) -> str:
     return f"{name.replace('_', ' ')} [{unit}]"
 
 
-def _component(field: str, component: int, continuum) -> str:
-    return continuum.stress_components[component] if field == "stress" else continuum.axes[component]
+def _component(values: np.ndarray, field: str, which: int, continuum) -> str:
+    """Name of a component: s12, y, or xy of a tensor counted row by row."""
+    if field == "stress":
+        return continuum.stress_components[which]
+    return "".join(continuum.axes[k] for k in np.unravel_index(which, values.shape[1:]))

@@ -42,6 +42,7 @@ class Simulation:
         shortest_step, longest_step: smallest and largest Δt used so far [s].
         wall_time: seconds spent in `step`, without the start.
         nodes, auxiliary, history: the arrays on the device.
+        conditions: the boundary conditions on the device, among them the free surface.
 
     Raises:
         SceneError: the device, the precision or the time step is not allowed.
@@ -55,7 +56,7 @@ class Simulation:
         self.time_step_limit = time_step_limit(scene)
         self._stepper = Stepper(scene, self.precision, self.device)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
-        self.history = self._stepper.history
+        self.history, self.conditions = self._stepper.history, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
 

@@ -49,7 +49,8 @@ def time_step_limit(scene: Scene) -> float:
             f"up to {limit:.4g}",
         )
     dt = numerics.courant * per_courant
-    if isinstance(material, PerzynaVonMises) and material.fluidity > 0.0:
+    flows = isinstance(material, PerzynaVonMises) and material.fluidity > 0.0
+    if flows and numerics.source_scheme == "rk4":
         rate = (
             material.relaxation_modulus(lattice.dim)
             * material.fluidity

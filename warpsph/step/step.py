@@ -15,9 +15,10 @@ from ..nodes.node_sets import (
     material_nodes,
     node_types,
 )
-from ..operators.conditions import Conditions, condition_types
+from ..operators.conditions import Conditions, ConditionTypes
+from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.motion import Motion, NoMotion, centre_kernel, half_step_gradient, initial_gradient
-from ..operators.sources import SOURCE_SCHEMES
+from ..operators.sources import sources
 from ..operators.sweep import sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
@@ -38,6 +39,7 @@ class Stepper:
         nodes: material nodes (struct of arrays, see `warpsph.nodes.node_sets`).
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
+        conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
         list_builds: how often the pair lists were built.
     """
 
@@ -60,8 +62,11 @@ class Stepper:
         search = (support, lattice.spacing, skin)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
-        self._sources = SOURCE_SCHEMES[numerics.source_scheme](scene, law, self._parameters, precision)
-        self._conditions = Conditions(scene.boundary, n, continuum, precision, device)
+        self._sources = sources(scene, law, self._parameters, precision)
+        if scene.free_surface is None:
+            self.conditions = Conditions(scene.boundary, n, continuum, precision, device)
+        else:
+            self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, device)
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
             continuum,
@@ -70,16 +75,17 @@ class Stepper:
             law.Parameters,
             numerics.velocity_scheme,
             scene.large_displacements,
+            self.conditions.types,
         )
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
-        parts = (self._around_nodes, self._sources, self._conditions, self._motion)
+        parts = (self._around_nodes, self._sources, self.conditions, self._motion)
         own = (centre_kernel(continuum, precision), self._to_auxiliary, self._to_nodes)
         load_kernels([*own, *(kernel for part in parts for kernel in part.kernels)], device)
 
         wp.launch(centre_kernel(continuum, precision), self._m, [self.nodes, self.auxiliary], device=device)
         self.list_builds = 0
         self._build_lists()
-        self._conditions.apply(self.nodes, 0.0, 0, self._health)
+        self.conditions.apply(self.nodes, 0.0, 0, self._health)
         self._initial_spin(scene)
 
     def step(self, number: int, t: float, dt: float) -> None:
@@ -94,10 +100,11 @@ class Stepper:
         self.to_auxiliary(dt)  # 3-6
         self.to_nodes(t + 0.5 * dt, dt)  # 7-10
         self._sources.half_step(self.nodes, self.history, t + 0.5 * dt, 0.5 * dt)  # 11-12
-        self._conditions.apply(self.nodes, t + dt, number, self._health)  # 13
+        self.conditions.apply(self.nodes, t + dt, number, self._health)  # 13
         self._motion.move(self.nodes, self.auxiliary, dt)  # 14
         if self._motion.lists_outdated():
             self._build_lists()
+        self.conditions.follow(self.nodes, dt)
 
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
@@ -110,13 +117,13 @@ class Stepper:
 
     def to_nodes(self, t_half: float, dt: float) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        self._conditions.set_time(t_half)
+        self.conditions.set_time(t_half)
         wp.launch(
             self._to_nodes,
             self._n,
             inputs=[
                 self._parameters,
-                self._conditions.table,
+                self.conditions.table,
                 dt,
                 self._around_nodes.pairs,
                 self.auxiliary,
@@ -134,6 +141,7 @@ class Stepper:
         self._around_auxiliary.build()
         self._around_nodes.build()
         self._motion.mark(self.nodes)
+        self.conditions.locate(self.nodes)
         self.list_builds += 1
 
     def _initial_spin(self, scene: Scene) -> None:
@@ -174,9 +182,15 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 
 @cache
 def _to_nodes_kernel(
-    continuum: Continuum, precision: Precision, kernel: str, Parameters: type, scheme: str, moves: bool
+    continuum: Continuum,
+    precision: Precision,
+    kernel: str,
+    Parameters: type,
+    scheme: str,
+    moves: bool,
+    conditions: ConditionTypes,
 ):
-    types, conditions = node_types(continuum, precision), condition_types(continuum, precision)
+    types = node_types(continuum, precision)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient

@@ -19,6 +19,7 @@ class Law:
         history: name and unit of each internal variable a node keeps.
         flow: (σ, history, Parameters) → (dσ/dt, d history/dt) by inelastic flow alone.
         flow_stiffness: (σ, history, Parameters) → the rate λ [1/s] at which that flow decays, for the step limit.
+        relax: (σ, history, Parameters, Δt) → (σ, history) after that flow has acted for Δt, stable for any Δt.
     """
 
     Parameters: type
@@ -26,3 +27,4 @@ class Law:
     history: tuple[tuple[str, str], ...] = ()
     flow: wp.Function | None = None
     flow_stiffness: wp.Function | None = None
+    relax: wp.Function | None = None

@@ -15,6 +15,8 @@ from ..precision import Precision
 from .elastic import fill_moduli
 from .law import Law
 
+MEAN_YIELD_ITERATIONS = 4
+
 
 @cache
 def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
@@ -66,7 +68,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
 
     @wp.func
     def flow_stiffness(sigma: stress, history: scalar, p: PerzynaParameters):
-        """|∂(dq/dt)/∂q| + |∂(dq/dt)/∂ε̄|-like bound: (3G + |H| q/Y) γ N ⟨·⟩^{N−1}/Y."""
+        """A bound of the rate at which the overstress decays: (3G + |H| q/Y) γ N ⟨(q − Y)/Y⟩^{N−1}/Y."""
         q = von_mises(sigma)
         Y = current_yield_size(history[0], p)
         modulus = real(3.0) * p.shear
@@ -80,10 +82,49 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
             lam = slope * (modulus + wp.abs(p.hardening) * q / Y)
         return lam
 
+    @wp.func
+    def overstress_after(over: real, b: real, Y: real, p: PerzynaParameters, dt: real):
+        """F = q − Y after dt of dF/dt = −b γ (F/Y)ᴺ at constant Y: exact for every N."""
+        rate = b * p.fluidity * dt / Y
+        if p.exponent == real(1.0):
+            return over * wp.exp(-rate)
+        n = p.exponent - real(1.0)
+        return over * wp.pow(real(1.0) + n * rate * wp.pow(over / Y, n), -real(1.0) / n)
+
+    @wp.func
+    def relax(sigma: stress, history: scalar, p: PerzynaParameters, dt: real):
+        q = von_mises(sigma)
+        eps = history[0]
+        Y = current_yield_size(eps, p)
+        if q <= Y:
+            return sigma, history
+        modulus = real(3.0) * p.shear
+        if wp.static(in_bar):
+            modulus = p.young
+        over = q - Y
+        b = modulus + p.hardening
+        if p.hardening < real(0.0) and p.residual >= Y:
+            b = modulus
+        # Y moves with the flow: take its mean over the step, found by iteration (a contraction, |H| < b).
+        strain = real(0.0)
+        for _sweep in range(wp.static(MEAN_YIELD_ITERATIONS)):
+            mean = real(0.5) * (Y + current_yield_size(eps + strain, p))
+            strain = (over - overstress_after(over, b, mean, p, dt)) / b
+        # Where softening ends on the way, the rest of the time passes at the residual size.
+        softened = (p.residual - Y) / wp.min(p.hardening, real(-1e-30))
+        if p.hardening < real(0.0) and p.residual < Y and strain > softened:
+            left = dt * (real(1.0) - softened / strain)
+            over = over - b * softened
+            strain = softened + (over - overstress_after(over, modulus, p.residual, p, left)) / modulus
+        history_new = history
+        history_new[0] = eps + strain
+        return sigma - strain * relaxation(sigma, q, p.shear, p.young), history_new
+
     return Law(
         PerzynaParameters,
         fill,
         history=(("equivalent_plastic_strain", "-"),),
         flow=flow,
         flow_stiffness=flow_stiffness,
+        relax=relax,
     )

@@ -1,29 +1,47 @@
-"""Free-surface detection, the paper's figures 3 and 4: whatever the scene `wavy_surface` checks and draws."""
+"""Free-surface detection: the paper's figures 3 and 4, and bodies whose normals are known exactly."""
 
 from __future__ import annotations
 
-from ...catalogue import shipped
-from ..case import Case, Picture, Row, Section
+from ..case import Case, Picture, Row, Section, Table
 from ..prose import prose
 from ..runs import Run
 
 SCENE = "wavy_surface"
+IMPROVED = Run(SCENE, SCENE)
+MARRONE = Run(f"{SCENE}_marrone", SCENE, ("normals=marrone",))
+OTHERS = ("disc", "ellipse", "staircase")
 
 
-def case(quick: bool) -> Case | None:
-    """The case, where this version of warpsph ships the scene."""
-    return Case(SCENE, (Run(SCENE, SCENE),), tell) if SCENE in shipped() else None
+def case(quick: bool) -> Case:
+    """The same in the quick form."""
+    others = (Run(f"{SCENE}_{body}", SCENE, (f"body={body}",)) for body in OTHERS)
+    return Case(SCENE, (IMPROVED, MARRONE, *others), tell)
 
 
 def tell(results, picture) -> Section:
-    """Its checks as rows, its pictures as they are."""
-    result = results[SCENE]
+    """Classification and both normals as pictures; angles of all bodies, the staircase beside the smooth ones."""
+    wave = results[IMPROVED.name]
+    bodies = {body: wave.file.module.compare(body, wave.parameters) for body in wave.file.module.BODIES}
+    surface = "surface.png"
     return Section(
-        prose=prose(SCENE, description=result.file.module.__doc__.strip()),
+        prose=prose(SCENE),
         rows=[
-            Row(check["name"].replace("_", " "), check["value"], check["unit"], exact=check["reference"])
-            for check in result.summary["checks"]
+            *(Row(f"{b}, mean angle, improved normals", float(bodies[b][0]), "°", None, 0.0) for b in bodies),
+            *(Row(f"{b}, mean angle, Marrone's normals", float(bodies[b][1]), "°", None, 0.0) for b in bodies),
         ],
-        pictures=[Picture(path, path.stem.replace("_", " ")) for path in sorted(result.folder.glob("*.png"))],
-        results=[result],
+        pictures=[
+            Picture(
+                wave.folder / surface, "Fig. 3b and 4a: nodes on the free surface, and their improved normals."
+            ),
+            Picture(results[MARRONE.name].folder / surface, "Fig. 4b: the same with Marrone's normals."),
+            *(Picture(results[f"{SCENE}_{b}"].folder / surface, f"{b.capitalize()}.") for b in OTHERS),
+        ],
+        results=[wave],
+        tables=[
+            Table(
+                "Nodes misjudged (interior nodes called free, or edge nodes missed):",
+                tuple(bodies),
+                [tuple(str(bodies[body][2]) for body in bodies)],
+            )
+        ],
     )

@@ -1,0 +1,63 @@
+"""A moving free surface: which part of the body's edge is looked at, and how."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SceneError
+from .boundary import BoundaryTable
+from .lattice import Lattice
+from .validate import choice, number
+
+NORMALS = ("improved", "marrone")
+LARGEST_SCAN = 2.0
+
+
+@dataclass(frozen=True)
+class FreeSurface:
+    """Makes the body's edge traction-free wherever no velocity is prescribed, as it moves and deforms.
+
+    Surface nodes and their normals are found anew in the current configuration (see
+    `warpsph.operators.surface_scan`), unlike those of `Free`, whose normals are the initial ones.
+
+    Args:
+        scan_ratio: length of the scan over the local spacing h_s/Δx [-].
+        normals: `improved` (fitted to the neighbouring surface nodes) or `marrone` (of the scan itself).
+    """
+
+    scan_ratio: float = 4.0 / 3.0
+    normals: str = "improved"
+
+    def __post_init__(self):
+        object.__setattr__(self, "scan_ratio", number("FreeSurface.scan_ratio", self.scan_ratio, above=0.0))
+        choice("FreeSurface.normals", self.normals, NORMALS)
+
+    def check(self, dim: int) -> None:
+        """Raise `SceneError` when the free surface does not fit `dim` space dimensions.
+
+        The scan covers a ball of radius h_s/√2; in a lattice it finds a node wherever it points once that is
+        no smaller than half the diagonal of a cell, √d Δx/2.
+        """
+        if dim == 1:
+            raise SceneError("free_surface", self, "a bar has no free surface that moves; use Free(edge(…))")
+        least = math.sqrt(dim / 2.0)
+        number("FreeSurface.scan_ratio", self.scan_ratio, at_least=least, at_most=LARGEST_SCAN)
+
+    def candidates(self, lattice: Lattice, boundary: BoundaryTable) -> np.ndarray:
+        """The nodes that can be on the free surface, indices, shape (b,), ascending.
+
+        They are the nodes of the boundary faces that no velocity condition covers. The body can not tear, as
+        auxiliary nodes stay in the middle of their initial cells, so no other node ever gets there. A node
+        at the end of a wall is one of them: it belongs to the free surface as well.
+        """
+        moved = self.moved(lattice, boundary)
+        return np.unique(lattice.faces[~moved[lattice.faces].all(axis=1)])
+
+    def moved(self, lattice: Lattice, boundary: BoundaryTable) -> np.ndarray:
+        """Which nodes are under a velocity condition, boolean, shape (n,)."""
+        moved = np.zeros(len(lattice.nodes), dtype=bool)
+        moved[boundary.nodes] = boundary.moved
+        return moved
