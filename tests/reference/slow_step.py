@@ -1,7 +1,7 @@
 """One time step of Runge-Kutta Taylor SPH, 2D plane strain, slow and plain on purpose.
 
 An independent float64 reference for the tests: Python loops over targets and neighbours, one function per
-numbered step group of shared/METHOD.md section 3. Nothing here is shared with the implementation it checks.
+numbered step group of docs/method.md, section 3. Nothing here is shared with the implementation it checks.
 
 Conventions
 -----------
@@ -10,7 +10,7 @@ Subscript s: after steps 1-2. Subscript half: phi^{n+1/2}. The configuration (x,
 during the whole step and moves only in step 14.
 """
 
-# ruff: noqa: E741  (I and J are the target and the source, as in METHOD.md)
+# ruff: noqa: E741  (I and J are the target and the source, as in docs/method.md)
 
 import numpy as np
 
