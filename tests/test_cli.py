@@ -3,8 +3,10 @@
 import csv
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -396,3 +398,17 @@ def test_nan_ends_the_run_with_1_and_keeps_what_was_recorded(user_file, tmp_path
     summary = summary_of(tmp_path)
     assert message == f"warpsph: {summary['error']}"
     assert summary["steps"] == 3 and summary["checks"] == []
+
+
+def test_an_interrupt_ends_a_run_in_one_line_and_keeps_its_history(tmp_path):
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "warpsph", "run", "gravity_slope", "--device", "cpu", "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    history, limit = out / "history.csv", time.monotonic() + 60.0
+    while time.monotonic() < limit and not (history.is_file() and len(history.read_text().splitlines()) > 3):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert errors.strip() == "warpsph: interrupted; what was recorded so far is kept"
+    assert len(history.read_text().splitlines()) > 3

@@ -24,6 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SceneError as error:
         print(f"warpsph: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
+        return 130
     except BrokenPipeError:  # the reader of our output has gone, e.g. `warpsph list | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
