@@ -82,11 +82,6 @@ class Neighbours:
             self.pairs.index = wp.empty(int(1.1 * total) + 1, dtype=wp.int32, device=device)
         wp.launch(kernels.fill, n, inputs=[*query, self.pairs], device=device)
 
-    def mean_count(self) -> float:
-        """Mean number of listed neighbours a target."""
-        start = self.pairs.start.numpy()
-        return float(start[-1]) / (len(start) - 1)
-
 
 def _grid_size(sources, spacing: float, dim: int) -> tuple[int, int, int]:
     """Cells of the hash grid along each axis: about one a search radius, flat where there is no axis."""

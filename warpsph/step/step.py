@@ -153,11 +153,6 @@ class Stepper:
         self.to_nodes(0.0, 0.0)
         wp.copy(self.nodes.point, start)
 
-    @property
-    def neighbours(self) -> tuple[float, float]:
-        """Mean number of listed neighbours of a material and of an auxiliary node."""
-        return self._around_nodes.mean_count(), self._around_auxiliary.mean_count()
-
 
 @cache
 def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type):
