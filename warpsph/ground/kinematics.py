@@ -24,6 +24,7 @@ class Kinematics:
         spin: (σ, L) → ω σ − σ ω (Jaumann).
         von_mises: σ → q = √(3 J₂); |σ| in a bar.
         relaxation: (σ, q, G, E) → Dₑ : ∂q/∂σ = 3 G s/q; E σ/q in a bar.
+        spherical: p → p 1 as stored, σ33 of plane strain included; p in a bar.
         transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
     """
 
@@ -32,6 +33,7 @@ class Kinematics:
     spin: wp.Function
     von_mises: wp.Function
     relaxation: wp.Function
+    spherical: wp.Function
     transform: wp.Function
 
 
@@ -67,10 +69,14 @@ def _bar(precision: Precision) -> Kinematics:
         return (young / q) * sigma
 
     @wp.func
+    def spherical(p: real):
+        return stress(p)
+
+    @wp.func
     def transform(sigma: stress, P: matrix):
         return P[0, 0] * sigma * P[0, 0]
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
 
 
 def _plane_strain(precision: Precision) -> Kinematics:
@@ -113,11 +119,15 @@ def _plane_strain(precision: Precision) -> Kinematics:
         return (real(3.0) * shear / q) * deviator
 
     @wp.func
+    def spherical(p: real):
+        return stress(p, p, real(0.0), p)
+
+    @wp.func
     def transform(sigma: stress, P: matrix):
         s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * wp.transpose(P)
         return stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
 
 
 def _solid(precision: Precision) -> Kinematics:
@@ -167,10 +177,14 @@ def _solid(precision: Precision) -> Kinematics:
         return (real(3.0) * shear / q) * deviator
 
     @wp.func
+    def spherical(p: real):
+        return stress(p, p, p, real(0.0), real(0.0), real(0.0))
+
+    @wp.func
     def transform(sigma: stress, P: matrix):
         return stored(P * tensor(sigma) * wp.transpose(P))
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, transform)
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
 
 
 _KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {

@@ -57,6 +57,21 @@ def determinant_of(dim: int, precision: Precision) -> wp.Function:
 
 
 @cache
+def inverse_of(dim: int, precision: Precision) -> wp.Function:
+    """Inverse of a regular d × d matrix, d = 1 included."""
+    matrix = precision.mat(dim, dim)
+
+    @wp.func
+    def inverse(a: matrix):
+        if wp.static(dim == 1):
+            return matrix(precision.real(1.0) / a[0, 0])
+        else:
+            return wp.inverse(a)
+
+    return inverse
+
+
+@cache
 def rotation_of(dim: int, precision: Precision) -> wp.Function:
     """(L, Δt) → R = exp(ω Δt), ω the skew part of L, by Rodrigues' formula, in the plane as in space.
 

@@ -4,8 +4,9 @@ At a constrained node, applying the conditions at time t means
 
     v ← P v + Σ_k a_k f_k(t),        σ ← Π σ,
 
-with P the projector onto the directions whose velocity is free and Π the projector (in the Frobenius norm) onto
-the stresses whose prescribed tractions vanish. Where conditions meet (METHOD section 5):
+with P the projector onto the directions whose velocity is free and Π a projector onto the stresses whose prescribed
+tractions vanish, orthogonal in the Frobenius norm (tractions are cut off, as published) or in that of the elastic
+energy (they are released by elastic unloading: Π = 1 − Dₑ Nᵀ (N Dₑ Nᵀ)⁻¹ N, N the tractions' rows). Where conditions meet (METHOD section 5):
 
 - a velocity condition beats a traction condition: a free edge frees only the directions that nobody moves;
 - a wall without friction keeps its zero shear at its ends as well, as a plane of symmetry does;
@@ -56,13 +57,24 @@ class BoundaryTable:
     moved: np.ndarray
 
 
-def resolve(lattice: Lattice, conditions: Sequence[Condition]) -> BoundaryTable:
-    """Resolve the conditions on a lattice; see the module's text for the rules."""
+def resolve(
+    lattice: Lattice, conditions: Sequence[Condition], stiffness: np.ndarray | None = None
+) -> BoundaryTable:
+    """Resolve the conditions on a lattice; see the module's text for the rules.
+
+    Args:
+        lattice: the lattice.
+        conditions: the conditions.
+        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then vanish by elastic unloading. They
+            are cut off, all other components kept, unless it is given.
+    """
     dim, continuum = lattice.dim, lattice.continuum
     groups = _groups(lattice, conditions)
     nodes = np.array(sorted(node for members in groups.values() for node in members), dtype=np.int64)
     row_of = {node: row for row, node in enumerate(nodes.tolist())}
     size = continuum.stress_size
+    if stiffness is None:
+        stiffness = np.diag([1.0 if i == j else 0.5 for i, j in continuum.pairs])
     projectors = np.zeros((len(nodes), dim, dim))
     stress = np.zeros((len(nodes), size, size))
     moved = np.zeros(len(nodes), dtype=bool)
@@ -83,7 +95,7 @@ def resolve(lattice: Lattice, conditions: Sequence[Condition]) -> BoundaryTable:
         projector = _clean(np.eye(dim) - inverse @ directions)
         _refuse_contradiction(directions, rows, signature, conditions, points)
         projectors[where] = projector
-        stress[where] = _stress_projector(signature, conditions, projector, points, continuum)
+        stress[where] = _stress_projector(signature, conditions, projector, points, continuum, stiffness)
         moved[where] = len(rows) > 0
         for column, (_, parts) in zip(inverse.T, rows, strict=True):
             for coefficient, function in parts:
@@ -199,7 +211,7 @@ def _refuse_contradiction(directions, rows, signature, conditions, points) -> No
         )
 
 
-def _stress_projector(signature, conditions, projector, points, continuum: Continuum) -> np.ndarray:
+def _stress_projector(signature, conditions, projector, points, continuum: Continuum, stiffness) -> np.ndarray:
     """Π at a node: the stresses for which every prescribed traction component vanishes."""
     rows = []
     for index, normals in signature:
@@ -215,12 +227,11 @@ def _stress_projector(signature, conditions, projector, points, continuum: Conti
                 moved_along_u = np.linalg.norm(projector @ u) < 1.0 - TOLERANCE
                 if not (moved_along_u and abs(u @ normal) > TOLERANCE):  # shear stays, see the module's text
                     rows.append(_traction_row(u, normal, continuum))
-    scale = np.array([1.0 if i == j else np.sqrt(2.0) for i, j in continuum.pairs])
     if not rows:
         return np.eye(continuum.stress_size)
-    scaled = np.array(rows) / scale
-    kernel = np.eye(continuum.stress_size) - np.linalg.pinv(scaled, rcond=TOLERANCE) @ scaled
-    return _clean(kernel * scale / scale[:, None])
+    traction = np.array(rows)
+    compliance = np.linalg.pinv(traction @ stiffness @ traction.T, rcond=TOLERANCE)
+    return _clean(np.eye(continuum.stress_size) - stiffness @ traction.T @ compliance @ traction)
 
 
 def _clean(matrix: np.ndarray) -> np.ndarray:

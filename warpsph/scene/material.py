@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from .dimension import Continuum
 from .validate import number
 
 
@@ -40,6 +43,14 @@ class Elastic:
         """λ = E ν / ((1 + ν)(1 − 2ν)) [Pa]."""
         nu = self.poisson_ratio
         return self.young_modulus * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+    def stiffness(self, continuum: Continuum) -> np.ndarray:
+        """Dₑ [Pa] from strains (engineering shear) to the stored stresses, shape (s, s); E for a bar."""
+        if continuum.dim == 1:
+            return np.array([[self.young_modulus]])
+        normal = np.array([i == j for i, j in continuum.pairs])
+        shear = self.shear_modulus * np.where(normal, 2.0, 1.0)
+        return self.lame_modulus * np.outer(normal, normal) + np.diag(shear)
 
     def wave_speed(self, dim: int) -> float:
         """Speed of the fastest wave [m/s]: √(E/ρ) in a bar, √((λ + 2G)/ρ) otherwise."""

@@ -28,7 +28,7 @@ KERNELS = {
     "cubic_spline": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
     "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
 }
-VELOCITY_SCHEMES = ("blanc-pastor", "taylor")
+VELOCITY_SCHEMES = ("blanc-pastor", "taylor", "compatible")
 SOURCE_SCHEMES = ("rk4", "analytic")
 LARGEST_SUPPORT = 6.0
 
@@ -62,6 +62,11 @@ class Numerics:
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
         if self.time_step is not None:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
+
+    @property
+    def unloads(self) -> bool:
+        """Whether free edges lose their tractions by elastic unloading, not by cutting them off."""
+        return self.velocity_scheme == "compatible"
 
     @property
     def support(self) -> float:

@@ -132,7 +132,10 @@ class Scene:
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
-        return resolve(self.lattice, self.conditions)
+        stiffness = None
+        if self.numerics.unloads:
+            stiffness = self.material.stiffness(self.lattice.continuum)
+        return resolve(self.lattice, self.conditions, stiffness)
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:

@@ -1,0 +1,150 @@
+"""Cells: the 2ᵈ nodes around each auxiliary node, for averages that no distortion can throw off balance.
+
+A mean over a cell's corners is exact for linear fields in any configuration, since an auxiliary node stands in the
+middle of its corners, and its weights are positive; on a lattice, so is a mean over the cells of a node.
+
+Of a field f at the corners, at ξ_a = ±½ along each axis a, a cell's mean and its gradient miss the parts that
+alternate along two axes or three, f_S = Σ s_S f/2ᵈ with s_S = Π_{a in S} 2ξ_a: the hourglass modes (Flanagan and
+Belytschko 1981). In f = … + Σ_S f_S Π_{a in S} 2ξ_a they are its mixed derivatives, and they serve twice:
+
+- the gradient at a corner differs from that in the middle: ∂f/∂ξ_a gains 2 f_S Π_{b in S, b ≠ a} 2ξ_b;
+- they are all of a checkerboard that can be seen: it has no mean and no gradient. f − θ mean(s_S f_S) damps it and
+  keeps Σ m f. As a product of second differences along two axes it leaves alone what varies along one axis only,
+  such as the kink of the stress under a free edge.
+
+Where the cell is no parallelogram the linear part of f has such modes as well; it is taken out first.
+"""
+
+import itertools
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from ..ground.linear_algebra import determinant_of, inverse_of
+from ..ground.precision import Precision
+from ..nodes.node_sets import node_types
+from ..scene.dimension import Continuum
+from ..scene.lattice import Lattice
+
+# Share of the mixed derivatives that goes into a node's gradient, for each axis (docs/velocity_steps.md). Without it
+# bending is too soft by 3/n² on n cells, with ½ by 1/n²; ½ is the most that Lax and Wendroff's damping allows.
+CORNER_SHARE = 0.5
+# A cell with less than this share of the volume of a box with edges as long has folded: it has no frame, and its
+# modes are taken as they are.
+FOLDED = 0.05
+
+
+@dataclass(frozen=True)
+class CellTypes:
+    """Warp side of the cells.
+
+    Attributes:
+        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
+        Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
+        describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
+        gather: (node, Cells, auxiliary nodes) → means over the cells of a node: of the auxiliary nodes' values, of
+            ∇φ at the node's corner, and of Σ_S s_S f_S.
+    """
+
+    Cell: type
+    Cells: type
+    describe: wp.Function
+    gather: wp.Function
+
+
+@cache
+def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
+    """The types and functions of one continuum in one precision."""
+    types, dim = node_types(continuum, precision), continuum.dim
+    real, phi, tensor, phi_gradient = precision.real, types.phi, types.tensor, types.phi_gradient
+    AuxiliaryNodes, Point = types.AuxiliaryNodes, types.Point
+    corners = 2**dim
+    end = np.array(list(itertools.product((-1.0, 1.0), repeat=dim)))  # 2ξ of each corner
+    subsets = [s for size in range(2, dim + 1) for s in itertools.combinations(range(dim), size)]
+    number = len(subsets)
+    columns = max(1, number)  # a bar has no such mode, and Warp no matrix without columns
+    alternating = np.stack([end[:, s].prod(axis=1) for s in subsets] or [np.zeros(corners)], axis=1)
+    phi_modes, position_modes = precision.mat(types.size, columns), precision.mat(dim, columns)
+    side = precision.mat(corners, dim)(*end.ravel().tolist())
+    sign = precision.mat(corners, columns)(*alternating.ravel().tolist())
+    determinant, inverse = determinant_of(dim, precision), inverse_of(dim, precision)
+
+    @wp.struct
+    class Cell:
+        gradient: phi_gradient
+        modes: phi_modes
+        frame: tensor
+
+    @wp.struct
+    class Cells:
+        cell: wp.array(dtype=Cell)
+        of_node: wp.array2d(dtype=wp.int32)
+
+    @wp.func
+    def frame_of(edges: tensor):
+        """∇ξ_a in row a, for the edges ∂x/∂ξ_a in column a; zero for a folded cell."""
+        columns_of = wp.transpose(edges)
+        box = real(1.0)
+        for a in range(wp.static(dim)):
+            box *= wp.length(columns_of[a])
+        if determinant(edges) <= real(FOLDED) * box:
+            return tensor()
+        return inverse(edges)
+
+    @wp.func
+    def describe(a: int, auxiliary: AuxiliaryNodes, nodes: wp.array(dtype=Point)):
+        cell = Cell()
+        mean, slopes, edges, bends = phi(), phi_gradient(), tensor(), position_modes()
+        for k in range(wp.static(corners)):
+            point = nodes[auxiliary.cell[a, k]]
+            mean += point.phi
+            edges += wp.outer(point.x, side[k])
+            slopes += wp.outer(point.phi, side[k])
+            cell.modes += wp.outer(point.phi, sign[k])
+            bends += wp.outer(point.x, sign[k])
+        share, twice = real(wp.static(1.0 / corners)), real(wp.static(2.0 / corners))
+        cell.frame = frame_of(twice * edges)
+        cell.modes = share * (cell.modes - (twice * slopes) * (cell.frame * bends))
+        return share * mean, cell
+
+    @wp.func
+    def beyond_middle(modes: phi_modes, end: types.vector):
+        """What ∂f/∂ξ_a at a corner has beyond that in the middle, `CORNER_SHARE` of it for each other axis."""
+        part = phi_gradient()
+        for s in range(wp.static(number)):
+            for a in range(wp.static(dim)):
+                if wp.static(a in subsets[s]):
+                    factor = real(2.0)
+                    for b in range(wp.static(dim)):
+                        if wp.static(b != a and b in subsets[s]):
+                            factor *= real(CORNER_SHARE) * end[b]
+                    for row in range(wp.static(types.size)):
+                        part[row, a] += factor * modes[row, s]
+        return part
+
+    @wp.func
+    def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point)):
+        value, gradient, checkerboard, found = phi(), phi_gradient(), phi(), real(0.0)
+        for k in range(wp.static(corners)):
+            a = cells.of_node[i, k]
+            if a >= 0:
+                found += real(1.0)
+                value += auxiliary[a].phi
+                gradient += cells.cell[a].gradient
+                if wp.static(number > 0):
+                    modes = cells.cell[a].modes
+                    gradient += beyond_middle(modes, side[k]) * cells.cell[a].frame
+                    checkerboard += modes * sign[k]
+        return value / found, gradient / found, checkerboard / found
+
+    return CellTypes(Cell, Cells, describe, gather)
+
+
+def cells_of_nodes(lattice: Lattice) -> np.ndarray:
+    """The cell whose corner k each node is, −1 where there is none, shape (n, 2ᵈ)."""
+    table = np.full((len(lattice.nodes), lattice.cells.shape[1]), -1, dtype=np.int32)
+    for k, corner in enumerate(lattice.cells.T):
+        table[corner, k] = np.arange(len(corner))
+    return table

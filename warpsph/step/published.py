@@ -1,0 +1,122 @@
+"""Steps 3-10 as published: Shepard values and corrected gradients from one set of nodes to the other."""
+
+from functools import cache
+
+import warp as wp
+
+from ..ground.materials.law import Law
+from ..ground.precision import Precision
+from ..ground.unknowns import unknowns
+from ..nodes.neighbours import PairList
+from ..nodes.node_sets import node_types
+from ..operators.conditions import ConditionTypes
+from ..operators.motion import half_step_gradient, initial_gradient
+from ..operators.sweep import sweep
+from ..operators.waves import wave_rate
+from ..scene.dimension import Continuum
+from ..scene.scene import Scene
+from .velocity_schemes import VELOCITY_SCHEMES
+
+
+class PublishedFluxes:
+    """The two sweeps of the published schemes.
+
+    Args:
+        scene: the scene.
+        law: its material law.
+        conditions: types of its boundary conditions.
+
+    Attributes:
+        kernels: the kernels of the two sweeps.
+    """
+
+    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device):
+        continuum, numerics = scene.lattice.continuum, scene.numerics
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
+        self._to_nodes = _to_nodes_kernel(
+            continuum,
+            precision,
+            numerics.kernel,
+            law.Parameters,
+            numerics.velocity_scheme,
+            scene.large_displacements,
+            conditions,
+        )
+        self.kernels = (self._to_auxiliary, self._to_nodes)
+
+    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, auxiliary) -> None:
+        """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
+        inputs = [material, dt, pairs, nodes, auxiliary]
+        wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
+
+    def to_nodes(self, material, conditions, dt: float, pairs: PairList, auxiliary, nodes) -> None:
+        """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
+        inputs = [material, conditions, dt, pairs, auxiliary, nodes]
+        wp.launch(self._to_nodes, nodes.point.shape[0], inputs, device=nodes.point.device)
+
+
+@cache
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type):
+    types = node_types(continuum, precision)
+    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
+    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    collect, value, gradient = parts.collect, parts.value, parts.gradient
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def to_auxiliary(
+        material: Parameters, dt: real, pairs: PairList, nodes: MaterialNodes, auxiliary: AuxiliaryNodes
+    ):
+        a = wp.tid()
+        point = auxiliary.point[a]
+        sums = collect(a, point.x, auxiliary.smoothing_length[a], point.phi, pairs, nodes.point)
+        phi = value(sums)  # 3
+        minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
+        auxiliary.point[a].phi = phi + real(0.5) * dt * minus_div_f  # 6
+
+    return to_auxiliary
+
+
+@cache
+def _to_nodes_kernel(
+    continuum: Continuum,
+    precision: Precision,
+    kernel: str,
+    Parameters: type,
+    scheme: str,
+    moves: bool,
+    conditions: ConditionTypes,
+):
+    types = node_types(continuum, precision)
+    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
+    phi = unknowns(continuum, precision)
+    velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
+    Table, apply = conditions.Table, conditions.apply
+    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    collect, value, gradient = parts.collect, parts.value, parts.gradient
+    advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
+    to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def to_nodes(
+        material: Parameters,
+        conditions: Table,
+        dt: real,
+        pairs: PairList,
+        auxiliary: AuxiliaryNodes,
+        nodes: MaterialNodes,
+    ):
+        i = wp.tid()
+        point = nodes.point[i]
+        sums = collect(i, point.x, nodes.smoothing_length[i], point.phi, pairs, auxiliary.point)
+        phi_half = apply(i, value(sums), conditions)  # 7
+        grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
+        minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
+
+        v_half = velocity(phi_half)
+        sigma_adv = stress(point.phi) + dt * stress(minus_div_f)  # 10a
+        v_adv = advance_velocity(velocity(point.phi), v_half, velocity(minus_div_f), dt)  # 10b
+        nodes.point[i].phi = join(v_adv, sigma_adv)
+        nodes.half_velocity[i] = v_half
+        nodes.velocity_gradient[i] = velocity_gradient(grad)
+
+    return to_nodes
