@@ -28,9 +28,6 @@ from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
 from ..scene.lattice import Lattice
 
-# Share of the mixed derivatives that goes into a node's gradient, for each axis (docs/velocity_steps.md). Without it
-# bending is too soft by 3/n² on n cells, with ½ by 1/n²; ½ is the most that Lax and Wendroff's damping allows.
-CORNER_SHARE = 0.5
 # A cell with less than this share of the volume of a box with edges as long has folded: it has no frame, and its
 # modes are taken as they are.
 FOLDED = 0.05
@@ -44,8 +41,8 @@ class CellTypes:
         Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
         Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
-        gather: (node, Cells, auxiliary nodes) → means over the cells of a node: of the auxiliary nodes' values, of
-            ∇φ at the node's corner, and of Σ_S s_S f_S.
+        gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes' values, of
+            ∇φ a share κ of the way to the node's corner, and of Σ_S s_S f_S.
     """
 
     Cell: type
@@ -110,8 +107,8 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
         return share * mean, cell
 
     @wp.func
-    def beyond_middle(modes: phi_modes, end: types.vector):
-        """What ∂f/∂ξ_a at a corner has beyond that in the middle, `CORNER_SHARE` of it for each other axis."""
+    def beyond_middle(modes: phi_modes, end: types.vector, share: real):
+        """What ∂f/∂ξ_a has beyond that in the middle at this share of the way to a corner along each other axis."""
         part = phi_gradient()
         for s in range(wp.static(number)):
             for a in range(wp.static(dim)):
@@ -119,13 +116,13 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                     factor = real(2.0)
                     for b in range(wp.static(dim)):
                         if wp.static(b != a and b in subsets[s]):
-                            factor *= real(CORNER_SHARE) * end[b]
+                            factor *= share * end[b]
                     for row in range(wp.static(types.size)):
                         part[row, a] += factor * modes[row, s]
         return part
 
     @wp.func
-    def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point)):
+    def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
         value, gradient, checkerboard, found = phi(), phi_gradient(), phi(), real(0.0)
         for k in range(wp.static(corners)):
             a = cells.of_node[i, k]
@@ -135,7 +132,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                 gradient += cells.cell[a].gradient
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
-                    gradient += beyond_middle(modes, side[k]) * cells.cell[a].frame
+                    gradient += beyond_middle(modes, side[k], share) * cells.cell[a].frame
                     checkerboard += modes * sign[k]
         return value / found, gradient / found, checkerboard / found
 

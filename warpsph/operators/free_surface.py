@@ -2,7 +2,9 @@
 
 Tractions vanish on every face that a surface node lies on: σ ← P σ P, P the projector onto the directions that
 lie in all of its faces. On a smooth surface P = 1 − n n; along the edge of a solid P = e e; at a corner, of two
-edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept.
+edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept. Where tractions vanish by elastic
+unloading, strains along the m directions taken out do it, and with them σ ← P σ P − λ/(m λ + 2G) tr(σ − P σ) (P + the
+direction out of plane).
 
 At the end of a wall a velocity condition beats the traction condition: only the directions that nobody moves are
 freed, so there n stands for its part along them. Without that a slope's toe would carry the full overburden on its
@@ -58,6 +60,7 @@ class FreeSurfaceConditions(Conditions):
         self.table.conditions = walls
         self.table.row = self._scan.row
         self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
+        self.table.unloading = wp.array(_unloading(scene), dtype=precision.real, device=device)
         self._turned = wp.zeros(self._b, dtype=precision.real, device=device)
         self._outdated = wp.zeros(1, dtype=wp.int32, device=device)
         self._kernel = apply_kernel(continuum, precision, self.types)
@@ -107,23 +110,50 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
     """The conditions' table and function, with the free surface: P of each candidate after all else."""
     phi, walls = unknowns(continuum, precision), condition_types(continuum, precision)
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    apply_walls, transform = walls.apply, kinematics(continuum, precision).transform
+    kin, types, dim, real = kinematics(continuum, precision), node_types(continuum, precision), continuum.dim, precision.real
+    apply_walls, transform, spherical = walls.apply, kin.transform, kin.spherical
+    stress, tensor = types.stress, types.tensor
+
+    @wp.func
+    def in_space(sigma: stress):
+        """σ11 + … + σdd."""
+        total = real(0.0)
+        for k in range(wp.static(dim)):
+            total += sigma[k]
+        return total
 
     @wp.struct
     class Table:
         conditions: walls.Table
         row: wp.array(dtype=wp.int32)
         projector: wp.array(dtype=precision.mat(continuum.dim, continuum.dim))
+        unloading: wp.array(dtype=precision.real)
+
+    @wp.func
+    def released(sigma: stress, P: tensor, unloading: wp.array(dtype=real)):
+        left = transform(sigma, P)
+        lost = in_space(sigma) - in_space(left)
+        taken = dim - wp.int32(wp.trace(P) + real(0.5))
+        return left - unloading[taken] * lost * transform(spherical(real(1.0)), P)
 
     @wp.func
     def apply(i: int, values: phi.phi, table: Table):
         result = apply_walls(i, values, table.conditions)
         c = table.row[i]
         if c >= 0:
-            result = join(velocity_of(result), transform(stress_of(result), table.projector[c]))
+            result = join(velocity_of(result), released(stress_of(result), table.projector[c], table.unloading))
         return result
 
     return ConditionTypes(Table, apply)
+
+
+def _unloading(scene: Scene) -> list[float]:
+    """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
+    material, dim = scene.material, scene.lattice.dim
+    if not scene.numerics.unloads:
+        return [0.0] * (dim + 1)
+    lame, shear = material.lame_modulus, material.shear_modulus
+    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, dim + 1))]
 
 
 @cache

@@ -16,6 +16,7 @@ from .lattice import Lattice
 from .material import Elastic
 from .numerics import Numerics
 from .output import Output
+from .selection import Bare
 from .shape import Shape
 from .validate import (
     TimeFunction,
@@ -58,7 +59,8 @@ class Scene:
         shape: the body with its lattice.
         material: `Elastic` or `PerzynaVonMises`.
         duration: simulated time [s].
-        conditions: boundary conditions; an edge without one keeps whatever traction it has.
+        conditions: boundary conditions; an edge without one is free of traction (with a published velocity scheme it
+            keeps whatever traction it has).
         free_surface: frees the edge that no condition moves of its tractions, as it moves and deforms; or None.
         body_force: uniform body force, or None.
         damping: mass-proportional damping c [1/s]: dv/dt = … − c v.
@@ -132,10 +134,12 @@ class Scene:
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
-        stiffness = None
-        if self.numerics.unloads:
-            stiffness = self.material.stiffness(self.lattice.continuum)
-        return resolve(self.lattice, self.conditions, stiffness)
+        if not self.numerics.unloads:
+            return resolve(self.lattice, self.conditions)
+        conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
+        if self.free_surface is None and bare.faces(self.lattice).any():
+            conditions = (*conditions, Free(bare))
+        return resolve(self.lattice, conditions, self.material.stiffness(self.lattice.continuum))
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:

@@ -148,6 +148,28 @@ class Outside(Selection):
         return ~self.inner.nodes(lattice)
 
 
+@dataclass(frozen=True)
+class Bare(Selection):
+    """The boundary faces that none of the given selections covers.
+
+    Args:
+        covering: the selections.
+    """
+
+    covering: tuple[Selection, ...]
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        mask = np.zeros(len(lattice.nodes), dtype=bool)
+        mask[lattice.faces[self.faces(lattice)]] = True
+        return mask
+
+    def faces(self, lattice: Lattice) -> np.ndarray:
+        bare = np.ones(len(lattice.faces), dtype=bool)
+        for selection in self.covering:
+            bare &= ~(selection.faces(lattice) & selection.nodes(lattice)[lattice.faces].all(axis=1))
+        return bare
+
+
 def _selection(value: object) -> Selection:
     if not isinstance(value, Selection):
         raise SceneError("selection", value, "it must be edge(…), region(…), where(…) or a combination")

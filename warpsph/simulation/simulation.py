@@ -15,7 +15,10 @@ from ..scene.validate import instance, number, vector
 from ..step.step import Stepper
 from .device import choose_device
 from .fields import FIELDS
-from .time_step import divide, time_step_limit
+from .time_step import ROUNDING, divide, time_step_limit
+
+# A step that has become too long is shortened by a little more than it must be, so that it is not done every time.
+HEADROOM = 0.95
 
 
 class Observer(Protocol):
@@ -38,7 +41,6 @@ class Simulation:
         lattice: its initial lattice.
         time: simulated time [s].
         steps: number of steps made.
-        time_step_limit: largest Δt the scene allows [s].
         shortest_step, longest_step: smallest and largest Δt used so far [s].
         wall_time: seconds spent in `step`, without the start.
         nodes, auxiliary, history: the arrays on the device.
@@ -53,12 +55,17 @@ class Simulation:
         self.precision = precision_of(precision)
         self.device = choose_device(device)
         self.lattice = scene.lattice
-        self.time_step_limit = time_step_limit(scene)
+        self._initial_limit = time_step_limit(scene)
         self._stepper = Stepper(scene, self.precision, self.device)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
         self.history, self.conditions = self._stepper.history, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
+
+    @property
+    def time_step_limit(self) -> float:
+        """Largest Δt the scene now allows [s]: less than at the start where nodes have come closer."""
+        return self._initial_limit * self._stepper.shrinkage
 
     def step(self, time_step: float | None = None) -> None:
         """Advance by one time step.
@@ -88,13 +95,15 @@ class Simulation:
         observers = tuple(observers)
         if end == self.time:
             return
-        start = self.time
-        steps, dt = divide(end - start, self.time_step_limit)
-        for k in range(1, steps + 1):
+        start, k, (steps, dt) = self.time, 0, divide(end - self.time, self.time_step_limit)
+        while k < steps:
             self._advance(dt)
+            k += 1
             self.time = start + (end - start) * (k / steps)
             for observer in observers:
                 observer.observe(self)
+            if dt > self.time_step_limit * (1.0 + ROUNDING) and k < steps:
+                start, k, (steps, dt) = self.time, 0, divide(end - self.time, HEADROOM * self.time_step_limit)
 
     def _advance(self, dt: float) -> None:
         begin = clock.perf_counter()

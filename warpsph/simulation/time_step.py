@@ -16,12 +16,12 @@ ROUNDING = 1e-9
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part, 2 √m₂ (METHOD section 3)."""
+    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 3), for the compatible scheme at most 1."""
     numerics, precision = scene.numerics, PRECISIONS["float64"]
     weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    return 2.0 * math.sqrt(
-        second_moment(weight, precision, numerics.smoothing_ratio, KERNELS[numerics.kernel].support)
-    )
+    moment = second_moment(weight, precision, numerics.smoothing_ratio, KERNELS[numerics.kernel].support)
+    limit = 2.0 * math.sqrt(moment)
+    return min(limit, 1.0) if numerics.unloads else limit
 
 
 def time_step_limit(scene: Scene) -> float:

@@ -17,6 +17,7 @@ from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.cell_motion import CellMotion
 from ..operators.motion import Motion, NoMotion, centre_kernel
 from ..operators.sources import sources
+from ..operators.spacing import Spacing
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 from .fluxes import FLUXES
@@ -35,6 +36,7 @@ class Stepper:
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
+        shrinkage: least spacing of the nodes over the initial one, at most 1, as of the last list.
         list_builds: how often the pair lists were built.
     """
 
@@ -50,12 +52,14 @@ class Stepper:
         self._device, self._n, self._m = device, n, len(lattice.cells)
 
         support, skin = KERNELS[numerics.kernel].support, 0.0
-        self._motion = NoMotion()
+        self._motion, self._spacing = NoMotion(), None
         if scene.large_displacements:
             skin = SKIN * lattice.spacing
             moving = (support, skin, scene.material.density, continuum, precision, device)
             cells = numerics.velocity_scheme == "compatible"
             self._motion = CellMotion(lattice, *moving) if cells else Motion(n, *moving)
+            if cells:
+                self._spacing = Spacing(self._m, continuum, precision, numerics.kernel, device)
         search = (support, lattice.spacing, skin)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
@@ -66,12 +70,12 @@ class Stepper:
             self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, device)
         self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
-        parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion)
+        parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion, self._spacing)
         centre = centre_kernel(continuum, precision)
-        load_kernels([centre, *(kernel for part in parts for kernel in part.kernels)], device)
+        load_kernels([centre, *(kernel for part in parts if part for kernel in part.kernels)], device)
 
         wp.launch(centre, self._m, [self.nodes, self.auxiliary], device=device)
-        self.list_builds = 0
+        self.list_builds, self.shrinkage = 0, 1.0
         self._build_lists()
         self.conditions.apply(self.nodes, 0.0, 0, self._health)
         self._initial_spin(scene)
@@ -114,6 +118,8 @@ class Stepper:
         self._around_nodes.build()
         self._motion.mark(self.nodes)
         self.conditions.locate(self.nodes)
+        if self._spacing:
+            self.shrinkage = self._spacing.shrinkage(self._around_auxiliary.pairs, self.nodes, self.auxiliary)
         self.list_builds += 1
 
     def _initial_spin(self, scene: Scene) -> None:
