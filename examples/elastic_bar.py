@@ -9,6 +9,7 @@ displacement swings between 0 and 0.001 m.
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     Box,
     Check,
     Elastic,
@@ -26,7 +27,7 @@ from warpsph import (
 LENGTH = 1.0  # [m]
 POINT = 0.1  # of the history [m]
 
-NUMERICS = {"courant": 1.0}
+NUMERICS = PUBLISHED
 PARAMETERS = (
     Parameter("spacing", 0.01, "m", "distance between neighbouring nodes"),
     Parameter("velocity", 1.0, "m/s", "velocity of the right end during the pull"),

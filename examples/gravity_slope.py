@@ -9,6 +9,7 @@ reported, not tuned.
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     BodyForce,
     Box,
     Check,
@@ -27,7 +28,7 @@ from warpsph import (
 SIZE = (4.0, 2.0)
 TOE, CREST = (4.0, 0.0), (4.0, 2.0)
 
-NUMERICS = {"courant": 1.0}
+NUMERICS = PUBLISHED
 SHORT = ("spacing=0.2", "duration=5")
 PARAMETERS = (
     Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),

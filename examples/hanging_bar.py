@@ -9,6 +9,7 @@ choice.
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     BodyForce,
     Box,
     Check,
@@ -27,7 +28,7 @@ from warpsph import (
 SIZE = (0.2, 1.0)
 GRAVITY = 9.81  # [m/s²]
 
-NUMERICS = {"courant": 1.0}
+NUMERICS = PUBLISHED
 PARAMETERS = (
     Parameter("spacing", 0.05, "m", "distance between neighbouring nodes"),
     Parameter("duration", 0.2, "s", "simulated time"),

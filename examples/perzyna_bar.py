@@ -11,6 +11,7 @@ and 0 ahead of it. Small strains.
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     Box,
     Check,
     Fixed,
@@ -26,7 +27,7 @@ from warpsph import (
 
 LENGTH = 1.0  # [m]; the front does not reach the far end
 
-NUMERICS = {"courant": 1.0, "smoothing_ratio": 0.5}
+NUMERICS = {**PUBLISHED, "smoothing_ratio": 0.5}
 PARAMETERS = (
     Parameter("spacing", 0.01, "m", "distance between neighbouring nodes"),
     Parameter("velocity", 1.0, "m/s", "velocity v0 of the end"),

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     Box,
     Check,
     EdgeForce,
@@ -40,7 +41,7 @@ RAYS = np.append(np.arange(-115.0, -4.9, 2.5), 0.0)
 NEAREST, FARTHEST = 1.2, 3.0
 SMOOTHING = 0.3  # of the strain along a ray [m]
 
-NUMERICS = {"courant": 1.0}
+NUMERICS = PUBLISHED
 PARAMETERS = (
     Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-3, "m/s²", "rate at which the footing's velocity grows"),

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     Box,
     Check,
     EdgeForce,
@@ -33,7 +34,7 @@ WIDTH = 5.0  # of the footing [m]
 MECHANISM = (0.05, 0.15)  # settlements between which the mechanism stands and the shape has hardly changed [m]
 PAPER_STRAIN = 0.73  # largest ε̄ with H = 0
 
-NUMERICS = {"courant": 1.0}
+NUMERICS = PUBLISHED
 PARAMETERS = (
     Parameter("spacing", 0.5, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-5, "m/s²", "rate at which the footing's velocity grows"),

@@ -18,6 +18,7 @@ A scene is built from named parts and run by a `Simulation`:
 
 from .errors import NonFiniteError, SceneError, WarpSPHError
 from .scene import (
+    PUBLISHED,
     BodyForce,
     Box,
     Check,
@@ -62,6 +63,7 @@ from .simulation.simulation import Observer, Simulation
 __version__ = "0.1.0"
 
 __all__ = [
+    "PUBLISHED",
     "BodyForce",
     "Box",
     "Check",

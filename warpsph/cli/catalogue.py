@@ -17,7 +17,7 @@ import contextlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -28,6 +28,7 @@ from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
 from ..scene.validate import instance, listed
 
+DEFAULT_NUMERICS = "numerics=default"
 PACKAGE = Path(__file__).resolve().parent.parent
 
 
@@ -57,8 +58,11 @@ class SceneFile:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its own parameters, then the numerical ones every scene takes."""
+        return self._parameters(getattr(self.module, "NUMERICS", {}))
+
+    def _parameters(self, numerics: Mapping[str, object]) -> tuple[Parameter, ...]:
         own = listed("PARAMETERS", getattr(self.module, "PARAMETERS", ()), Parameter, "a sequence of Parameter")
-        parameters = own + numerical_parameters(getattr(self.module, "NUMERICS", {}))
+        parameters = own + numerical_parameters(numerics)
         names = ["numerics", *(parameter.name for parameter in parameters)]
         for name in names:
             if names.count(name) > 1:
@@ -71,8 +75,12 @@ class SceneFile:
         return tuple(listed("SHORT", getattr(self.module, "SHORT", ()), str, "a sequence of name=value texts"))
 
     def build(self, settings: Sequence[str]) -> tuple[Scene, dict[str, object]]:
-        """The scene with `name=value` settings applied, and the values of its parameters."""
-        values = assign(self.parameters, settings)
+        """The scene with `name=value` settings applied, and the values of its parameters.
+
+        `numerics=default` stands for the package's numerical defaults instead of the scene's own.
+        """
+        own = [text for text in settings if "".join(text.split()) != DEFAULT_NUMERICS]
+        values = assign(self.parameters if len(own) == len(settings) else self._parameters({}), own)
         with self.blamed():
             scene = self.module.scene(namespace(values))
         instance(f"{self.name}.scene(p)", scene, Scene, "a Scene")

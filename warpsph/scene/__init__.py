@@ -8,7 +8,7 @@ from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .lattice import Lattice
 from .material import Elastic, PerzynaVonMises
-from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .numerics import KERNELS, PUBLISHED, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
 from .parameter import Parameter
 from .scene import BodyForce, Scene
@@ -20,6 +20,7 @@ __all__ = [
     "CONTINUA",
     "KERNELS",
     "PLANE_STRAIN",
+    "PUBLISHED",
     "SOLID",
     "SOURCE_SCHEMES",
     "VELOCITY_SCHEMES",

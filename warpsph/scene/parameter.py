@@ -58,15 +58,20 @@ def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...
     """The parameters every scene takes, with a scene's own defaults where it has any."""
     standard = {
         "smoothing_ratio": (None, "-", "smoothing length over spacing h/Δx; auto is the kernel's own default", ()),
-        "courant": (0.9, "-", "c_p Δt/Δx, c_p the fastest wave's speed", ()),
-        "kernel": ("gaussian", "-", f"smoothing function: {', '.join(KERNELS)}", tuple(KERNELS)),
+        "courant": (Numerics.courant, "-", "c_p Δt/Δx, c_p the fastest wave's speed", ()),
+        "kernel": (Numerics.kernel, "-", f"smoothing function: {', '.join(KERNELS)}", tuple(KERNELS)),
         "velocity_scheme": (
-            "blanc-pastor",
+            Numerics.velocity_scheme,
             "-",
             f"velocity step: {', '.join(VELOCITY_SCHEMES)}",
             VELOCITY_SCHEMES,
         ),
-        "source_scheme": ("rk4", "-", f"sources: {', '.join(SOURCE_SCHEMES)}", SOURCE_SCHEMES),
+        "source_scheme": (
+            Numerics.source_scheme,
+            "-",
+            f"sources: {', '.join(SOURCE_SCHEMES)}",
+            SOURCE_SCHEMES,
+        ),
         "time_step": (None, "s", "Δt; auto follows from courant and the stiffness of the sources", ()),
     }
     automatic = [name for name, row in standard.items() if row[0] is None]
