@@ -1,10 +1,10 @@
 """Measures how fast warpsph is, by itself and beside other solvers; see BENCHMARKS.md.
 
-    python tools/benchmark.py                          # everything; hours on a CPU
-    python tools/benchmark.py --quick                  # under 2 minutes on two cores
-    python tools/benchmark.py --dimensions 2 --nodes 1e5 --materials viscoplastic
-    python tools/benchmark.py --other pysph=/path/to/python
-    python tools/benchmark.py --compare old.json new.json
+python tools/benchmark.py                          # everything; hours on a CPU
+python tools/benchmark.py --quick                  # under 2 minutes on two cores
+python tools/benchmark.py --dimensions 2 --nodes 1e5 --materials viscoplastic
+python tools/benchmark.py --other pysph=/path/to/python
+python tools/benchmark.py --compare old.json new.json
 """
 
 import argparse
@@ -19,7 +19,7 @@ from benchmarking.scenes import MATERIALS
 from benchmarking.tables import compare, tables
 from benchmarking.work import work
 
-QUICK = Plan(nodes=(1000, 10_000, HEADLINE["nodes"]), seconds=0.5, limit=20.0)
+QUICK = Plan(nodes=(1000, 10_000, HEADLINE["nodes"]), seconds=0.2, limit=60.0, focus=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

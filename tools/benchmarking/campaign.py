@@ -35,6 +35,7 @@ class Plan:
         threads: numbers of threads of CPU kernels.
         seconds: time to fill with steps, a case.
         limit: longest that a case may be expected to take [s]; longer ones are skipped.
+        focus: all that for the headline's dimension and material; the others in float64 at the middle size only.
         copies, starts: whether to measure copies of memory and start-up times.
         others: name of an adapter → interpreter that has the solver.
         other_nodes: number of particles for those.
@@ -48,6 +49,7 @@ class Plan:
     threads: tuple[int, ...] = (1, all_cores())
     seconds: float = 3.0
     limit: float = 600.0
+    focus: bool = False
     copies: bool = True
     starts: bool = True
     others: tuple[tuple[str, str], ...] = ()
@@ -76,7 +78,7 @@ def run(plan: Plan, command: Sequence[str], out: Path, say: Callable[[str], None
     for device, threads in places:
         if plan.copies:
             _measure(report, "copies", {"device": device, "threads": threads}, _copy, out, say)
-        if plan.starts:
+        if plan.starts and device not in {row["device"] for row in report["starts"]}:
             _starts(report, device, threads, out, say)
     for series in _series(plan, places):
         last = None
@@ -98,10 +100,14 @@ def _places(devices: Iterable[str], threads: Iterable[int]) -> list[tuple[str, i
 def _series(plan: Plan, places: Iterable[tuple[str, int]]) -> list[list[Case]]:
     """The cases, those that differ in size only together, ascending."""
     variants = product(plan.dimensions, plan.materials, plan.precisions, places)
-    return [
-        [Case(dimension, material, precision, device, threads, n) for n in sorted(plan.nodes)]
-        for dimension, material, precision, (device, threads) in variants
-    ]
+    sizes = sorted(plan.nodes)
+    series = []
+    for dimension, material, precision, (device, threads) in variants:
+        chosen = sizes
+        if plan.focus and (dimension, material) != (HEADLINE["dimension"], HEADLINE["material"]):
+            chosen = [sizes[len(sizes) // 2]] if precision == "float64" else []
+        series.append([Case(dimension, material, precision, device, threads, n) for n in chosen])
+    return series
 
 
 def _time_case(report: dict, case: Case, last: dict | None, plan: Plan, out: Path, say) -> dict | None:
@@ -111,9 +117,7 @@ def _time_case(report: dict, case: Case, last: dict | None, plan: Plan, out: Pat
         report["skipped"].append({**key, "why": why})
         say(f"{case}: skipped, {why}")
         return last
-    row = _measure(
-        report, "results", key, lambda **case: _job("case", case=case, seconds=plan.seconds), out, say
-    )
+    row = _measure(report, "results", key, lambda **case: _job("case", case=case, seconds=plan.seconds), out, say)
     if row is None:
         return last
     row["memory_bandwidth_fraction"] = _fraction(row, report["copies"])
@@ -133,7 +137,8 @@ def _too_much(case: Case, last: dict | None, plan: Plan) -> str | None:
         return f"it would take about {needed / 1e9:.0f} GB of memory, and {free / 1e9:.0f} GB are free"
     # The warm-up, one timed interval and the one for the phases.
     steps = 3 * last["steps_per_list_build"]
-    expected = steps * last["seconds_per_step"] * case.nodes / last["nodes"]
+    growth = max(1.0, last["growth"] or 1.0)
+    expected = steps * last["seconds_per_step"] * (case.nodes / last["nodes"]) ** growth
     if expected > plan.limit:
         return f"it would take about {expected:.0f} s, and the limit is {plan.limit:.0f} s"
     return None

@@ -1,8 +1,8 @@
 """Counts what a step moves and computes, from the arrays a simulation really has.
 
 Bytes: the least a step can move to and from memory, each array of a kernel once, elements whole (a kernel that
-changes one field of a packed struct moves all of it). Gathered neighbours count once a sweep: nodes are stored row by
-row, so that caches hold those of neighbouring targets. List builds are left out; they come once in a while.
+changes one field of a packed struct moves all of it). Gathered neighbours count once a sweep: nodes are stored row
+by row, so that caches hold those of neighbouring targets. List builds are left out; they come once in a while.
 """
 
 import operator

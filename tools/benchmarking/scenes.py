@@ -46,8 +46,8 @@ class Case:
 def scene(case: Case) -> Scene:
     """A cube of 1 m in the case's dimension, all its edges free, at the verge of yielding and shearing on.
 
-    Flow is active everywhere from the first steps on, as in a body that fails; in sources of the default scheme one
-    sub-step suffices at every size.
+    Flow is active everywhere from the first steps on, as in a body that fails; one sub-step of the default source
+    scheme suffices at every size.
     """
     cells = max(2, round(case.nodes ** (1.0 / case.dimension)) - 1)
     spacing, material = 1.0 / cells, MATERIALS[case.material]

@@ -20,9 +20,7 @@ def tables(report: dict) -> str:
         parts.append(table(("device", "threads", "copy, GB/s"), rows))
     if report["starts"]:
         names = ("seconds", "build_seconds", "first_step_seconds")
-        rows = [
-            (*_place(row), row["cache"], *(f"{row[name]:.2f}" for name in names)) for row in report["starts"]
-        ]
+        rows = [(*_place(row), row["cache"], *(f"{row[name]:.2f}" for name in names)) for row in report["starts"]]
         parts.append(table(("device", "threads", "start", "in all, s", "build, s", "first step, s"), rows))
     if report["others"]:
         names = ("solver", "case", "threads", "nodes")
@@ -40,7 +38,16 @@ def tables(report: dict) -> str:
 
 
 def _speed(report: dict) -> str:
-    heads = ("node-steps/s", "spread", "growth", "bytes/node-step", "of copy", "Gflop/s", "bytes/node", "host peak")
+    heads = (
+        "node-steps/s",
+        "spread",
+        "growth",
+        "bytes/node-step",
+        "of copy",
+        "Gflop/s",
+        "bytes/node",
+        "host peak",
+    )
     rows = [
         (
             *_case(row),
@@ -61,9 +68,7 @@ def _speed(report: dict) -> str:
 def _phases(report: dict) -> str:
     phases = list({phase: None for row in report["results"] for phase in row["phases"]})
     phases.sort(key="rest".__eq__)
-    rows = [
-        (*_case(row), *(_percent(row["phases"].get(phase)) for phase in phases)) for row in report["results"]
-    ]
+    rows = [(*_case(row), *(_percent(row["phases"].get(phase)) for phase in phases)) for row in report["results"]]
     return table((*_CASE_HEADS, *phases), rows)
 
 

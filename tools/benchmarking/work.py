@@ -1,4 +1,4 @@
-"""What is done in a process of its own: so that memory is its own, threads are set once, and a failure stays one."""
+"""What is done in a process of its own: its memory is its own, threads are set once, a failure stays one."""
 
 import json
 import time
