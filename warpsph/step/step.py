@@ -60,6 +60,8 @@ class Stepper:
             skin = SKIN * lattice.spacing
             self._motion = Motion(n, support, skin, scene.material.density, continuum, precision, device)
         search = (support, lattice.spacing, skin)
+        # Before the lists, whose grids are sized by where the nodes are.
+        wp.launch(centre_kernel(continuum, precision), self._m, [self.nodes, self.auxiliary], device=device)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
         self._sources = sources(scene, law, self._parameters, precision)
@@ -82,7 +84,6 @@ class Stepper:
         own = (centre_kernel(continuum, precision), self._to_auxiliary, self._to_nodes)
         load_kernels([*own, *(kernel for part in parts for kernel in part.kernels)], device)
 
-        wp.launch(centre_kernel(continuum, precision), self._m, [self.nodes, self.auxiliary], device=device)
         self.list_builds = 0
         self._build_lists()
         self.conditions.apply(self.nodes, 0.0, 0, self._health)
