@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warpsph import (
     Box,
@@ -113,3 +114,17 @@ def test_small_displacements_keep_the_configuration():
     simulation.run()
     assert not simulation.field("displacement").any()
     assert simulation.list_builds == 1
+
+
+def test_grids_of_both_pair_lists_span_the_body(monkeypatch):
+    """A grid of too few cells finds the same pairs, in a time that grows with the square of the nodes."""
+    sizes = []
+
+    class Grid(wp.HashGrid):
+        def __init__(self, *size, **options):
+            sizes.append(size)
+            super().__init__(*size, **options)
+
+    monkeypatch.setattr(wp, "HashGrid", Grid)
+    Simulation(bar(), device="cpu")
+    assert sizes == [(10, 1, 1), (10, 1, 1)]  # a metre, and 19 spacings, of 0.05 m at about two a cell

@@ -69,7 +69,7 @@ def make_scene(scheme, kernel, small_strain):
         velocity=lambda x, y: [f(x, y) for f in velocity],
         stress=lambda x, y: [f(x, y) for f in stress],
         large_displacements=not small_strain,
-        numerics=Numerics(velocity_scheme=scheme, kernel=kernel, courant=0.5),
+        numerics=Numerics(velocity_scheme=scheme, source_scheme="rk4", kernel=kernel, courant=0.5),
     )
 
 

@@ -93,7 +93,7 @@ def plane_wave_errors(spacing, axis, precision):
         ],
         duration=1.6 * duration,
         large_displacements=False,
-        numerics=Numerics(velocity_scheme="taylor"),
+        numerics=Numerics(velocity_scheme="taylor", courant=0.9),
     )
     simulation = Simulation(scene, device="cpu", precision=precision)
     simulation.run()

@@ -61,6 +61,9 @@ class Stepper:
             if cells:
                 self._spacing = Spacing(self._m, continuum, precision, numerics.kernel, device)
         search = (support, lattice.spacing, skin)
+        # Before the lists, whose grids are sized by where the nodes are.
+        centre = centre_kernel(continuum, precision)
+        wp.launch(centre, self._m, [self.nodes, self.auxiliary], device=device)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
         self._sources = sources(scene, law, self._parameters, precision)
@@ -71,10 +74,8 @@ class Stepper:
         self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
         parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion, self._spacing)
-        centre = centre_kernel(continuum, precision)
         load_kernels([centre, *(kernel for part in parts if part for kernel in part.kernels)], device)
 
-        wp.launch(centre, self._m, [self.nodes, self.auxiliary], device=device)
         self.list_builds, self.shrinkage = 0, 1.0
         self._build_lists()
         self.conditions.apply(self.nodes, 0.0, 0, self._health)

@@ -1,0 +1,95 @@
+"""Times steps as a user makes them, and, apart from that, each phase of the step."""
+
+import time
+from collections import defaultdict
+
+import warp as wp
+
+from warpsph import Simulation
+
+# The parts of `Stepper.step` by phase: (attribute of the stepper or None for itself, method).
+PHASES = {
+    "sources": ("_sources", "half_step"),
+    "to_auxiliary": (None, "to_auxiliary"),
+    "to_nodes": (None, "to_nodes"),
+    "conditions": ("conditions", "apply"),
+    "motion": ("_motion", "move"),
+    "lists": (None, "_build_lists"),
+}
+REST = "rest"  # all else: reading flags, evaluating functions of time, Python
+LONGEST_INTERVAL = 400  # steps; the scenes rebuild their lists every 40 or so
+
+
+def advance_to_list_build(simulation: Simulation) -> int:
+    """Step until the pair lists have just been rebuilt; the number of steps."""
+    builds = simulation.list_builds
+    for k in range(1, LONGEST_INTERVAL + 1):
+        simulation.step()
+        if simulation.list_builds > builds:
+            return k
+    return LONGEST_INTERVAL
+
+
+def time_steps(simulation: Simulation, seconds: float) -> dict:
+    """Seconds a step, over whole intervals from one list build to the next.
+
+    Args:
+        simulation: fresh; its first interval is the warm-up.
+        seconds: time to fill; at least one interval is timed.
+
+    Returns:
+        `steps` timed, `steps_per_list_build`, `seconds_per_step` (median over the intervals, so that a disturbance
+        does not count) and `spread` ((slowest − fastest)/median; None for a single interval).
+    """
+    advance_to_list_build(simulation)
+    wp.synchronize_device(simulation.device)
+    per_step, steps, end = [], 0, time.perf_counter() + seconds
+    while not per_step or time.perf_counter() < end:
+        begin = time.perf_counter()
+        made = advance_to_list_build(simulation)
+        wp.synchronize_device(simulation.device)
+        per_step.append((time.perf_counter() - begin) / made)
+        steps += made
+    per_step.sort()
+    median = per_step[len(per_step) // 2]
+    return {
+        "steps": steps,
+        "steps_per_list_build": steps / len(per_step),
+        "seconds_per_step": median,
+        "spread": (per_step[-1] - per_step[0]) / median if len(per_step) > 1 else None,
+    }
+
+
+def time_phases(simulation: Simulation) -> dict[str, float]:
+    """Share of each phase in the time of the steps from one list build to the next [-].
+
+    The device is waited for after every phase, so the sum is more than the same steps take otherwise.
+    """
+    stepper, spent = simulation._stepper, defaultdict(float)
+    wrapped = []
+    for phase, (part, method) in PHASES.items():
+        owner = stepper if part is None else getattr(stepper, part)
+        if part is not None and not owner.kernels:
+            continue  # an object that does nothing
+        object.__setattr__(owner, method, _timed(getattr(owner, method), phase, spent, simulation.device))
+        wrapped.append((owner, method))
+    begin = time.perf_counter()
+    advance_to_list_build(simulation)
+    wp.synchronize_device(simulation.device)
+    total = time.perf_counter() - begin
+    for owner, method in wrapped:
+        object.__delattr__(owner, method)
+    spent[REST] = total - sum(spent.values())
+    return {phase: seconds / total for phase, seconds in spent.items()}
+
+
+def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):
+    def timed(*arguments):
+        wp.synchronize_device(device)
+        begin = time.perf_counter()
+        result = function(*arguments)
+        wp.synchronize_device(device)
+        spent[phase] += time.perf_counter() - begin
+        return result
+
+    return timed
