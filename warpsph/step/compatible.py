@@ -76,15 +76,15 @@ class CompatibleFluxes:
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, kernel, law.Parameters)
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, kernel, law)
         self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, law.Parameters, moves, conditions)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         courant = dt * self._courant_per_time
         front = STRENGTH * max(1.0 - courant**2, 0.0)
-        inputs = [material, dt, front, pairs, nodes, auxiliary, self._cells]
+        inputs = [material, dt, front, pairs, nodes, history, auxiliary, self._cells]
         wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
 
     def to_nodes(self, material, conditions, dt: float, pairs: PairList, auxiliary, nodes) -> None:
@@ -95,12 +95,15 @@ class CompatibleFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type):
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, law: Law):
+    Parameters, relax, internal = law.Parameters, law.relax, precision.vec(max(1, len(law.history)))
+    corners = 2**continuum.dim
     types, cells_types = node_types(continuum, precision), cell_types(continuum, precision)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
     Cells, describe = cells_types.Cells, cells_types.describe
     phi_of, spherical = unknowns(continuum, precision), kinematics(continuum, precision).spherical
     join, velocity_gradient, vector = phi_of.join, phi_of.velocity_gradient, types.vector
+    velocity, stress = phi_of.velocity, phi_of.stress
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
 
@@ -111,6 +114,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
         front: real,
         pairs: PairList,
         nodes: MaterialNodes,
+        history: wp.array(dtype=internal),
         auxiliary: AuxiliaryNodes,
         cells: Cells,
     ):
@@ -122,7 +126,14 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
         minus_div_f = rate(cell.gradient, real(1.0) / auxiliary.density[a], material)  # 4-5
         volumetric = wp.trace(velocity_gradient(cell.gradient))
         q = front_pressure_at(a, volumetric, cell.frame, auxiliary, nodes, front, dt)
-        auxiliary.point[a].phi = real(0.5) * dt * minus_div_f + join(vector(), spherical(q))  # 6
+        half = phi + real(0.5) * dt * minus_div_f  # 6
+        if wp.static(relax is not None):
+            mean = internal()
+            for k in range(wp.static(corners)):
+                mean += history[auxiliary.cell[a, k]]
+            flowed, _ = relax(stress(half), mean / real(corners), material, real(0.5) * dt)
+            half = join(velocity(half), flowed)
+        auxiliary.point[a].phi = half - phi + join(vector(), spherical(q))
         cells.cell[a] = cell
 
     return to_auxiliary

@@ -44,7 +44,7 @@ class PublishedFluxes:
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
         wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)

@@ -101,7 +101,8 @@ class Stepper:
 
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        self._fluxes.to_auxiliary(self._parameters, dt, self._around_auxiliary.pairs, self.nodes, self.auxiliary)
+        pairs = self._around_auxiliary.pairs
+        self._fluxes.to_auxiliary(self._parameters, dt, pairs, self.nodes, self.history, self.auxiliary)
 
     def to_nodes(self, t_half: float, dt: float) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
