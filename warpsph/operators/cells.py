@@ -38,11 +38,12 @@ class CellTypes:
     """Warp side of the cells.
 
     Attributes:
-        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
+        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each), `frame` (∇ξ_a in row a), `squareness`.
         Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
         gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes' values, of
-            ∇φ a share κ of the way to the node's corner, and of Σ_S s_S f_S.
+            ∇φ a share κ of the way to the node's corner, and of Σ_S s_S f_S. κ is cut by the squareness: in flat cells
+            the kernel, which is round, sees less of short waves than the corners do, and can not damp them.
     """
 
     Cell: type
@@ -73,6 +74,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
         gradient: phi_gradient
         modes: phi_modes
         frame: tensor
+        squareness: real
 
     @wp.struct
     class Cells:
@@ -91,6 +93,16 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
         return inverse(edges)
 
     @wp.func
+    def squareness_of(frame: tensor, volume: real):
+        """Square of the least height of a cell over the edge of a cube as large; 1 of a cube, 0 of a folded cell."""
+        per_height2 = real(0.0)
+        for a in range(wp.static(dim)):
+            per_height2 = wp.max(per_height2, wp.length_sq(frame[a]))
+        if per_height2 <= real(0.0):
+            return real(0.0)
+        return wp.min(real(1.0), wp.pow(volume, real(wp.static(-2.0 / dim))) / per_height2)
+
+    @wp.func
     def describe(a: int, auxiliary: AuxiliaryNodes, nodes: wp.array(dtype=Point)):
         cell = Cell()
         mean, slopes, edges, bends = phi(), phi_gradient(), tensor(), position_modes()
@@ -103,6 +115,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
             bends += wp.outer(point.x, sign[k])
         share, twice = real(wp.static(1.0 / corners)), real(wp.static(2.0 / corners))
         cell.frame = frame_of(twice * edges)
+        cell.squareness = squareness_of(cell.frame, determinant(twice * edges))
         cell.modes = share * (cell.modes - (twice * slopes) * (cell.frame * bends))
         return share * mean, cell
 
@@ -132,7 +145,8 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                 gradient += cells.cell[a].gradient
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
-                    gradient += beyond_middle(modes, side[k], share) * cells.cell[a].frame
+                    near = share * cells.cell[a].squareness
+                    gradient += beyond_middle(modes, side[k], near) * cells.cell[a].frame
                     checkerboard += modes * sign[k]
         return value / found, gradient / found, checkerboard / found
 

@@ -33,6 +33,7 @@ from ..scene.scene import Scene
 # with 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
 VELOCITY_SHARE = 1.0
 STRESS_SHARE = 0.3
+W_FLOW = float(__import__("os").environ.get("WF","1"))
 MARGIN = 0.9
 
 
@@ -50,6 +51,8 @@ def corner_share(courant: float, dim: int) -> float:
     """
     if dim == 1:
         return 0.0
+    if courant <= 0.0:
+        return 0.5
     theta = MARGIN * 0.5 * (VELOCITY_SHARE + STRESS_SHARE)
     undamped = 1.0 - courant**2 if dim == 2 else 0.75 * (1.0 - courant**2)
     return min(0.5, max(0.0, undamped + theta / (8.0 * courant**2)))
@@ -72,7 +75,6 @@ class CompatibleFluxes:
         continuum, moves = lattice.continuum, scene.large_displacements
         types = cell_types(continuum, precision)
         self._dim = lattice.dim
-        self._courant_per_time = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
@@ -80,16 +82,15 @@ class CompatibleFluxes:
         self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, law.Parameters, moves, conditions)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        courant = dt * self._courant_per_time
         front = STRENGTH * max(1.0 - courant**2, 0.0)
         inputs = [material, dt, front, pairs, nodes, history, auxiliary, self._cells]
         wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
 
-    def to_nodes(self, material, conditions, dt: float, pairs: PairList, auxiliary, nodes) -> None:
+    def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        share = corner_share(max(dt * self._courant_per_time, 1e-3), self._dim)
+        share = corner_share(courant, self._dim)
         inputs = [material, conditions, dt, share, pairs, auxiliary, self._cells, nodes]
         wp.launch(self._to_nodes, nodes.point.shape[0], inputs, device=nodes.point.device)
 
@@ -103,7 +104,8 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     Cells, describe = cells_types.Cells, cells_types.describe
     phi_of, spherical = unknowns(continuum, precision), kinematics(continuum, precision).spherical
     join, velocity_gradient, vector = phi_of.join, phi_of.velocity_gradient, types.vector
-    velocity, stress = phi_of.velocity, phi_of.stress
+    velocity, stress, tensor = phi_of.velocity, phi_of.stress, types.tensor
+    elastic_rate = kinematics(continuum, precision).elastic_rate
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
 
@@ -128,11 +130,15 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
         q = front_pressure_at(a, volumetric, cell.frame, auxiliary, nodes, front, dt)
         half = phi + real(0.5) * dt * minus_div_f  # 6
         if wp.static(relax is not None):
-            mean = internal()
+            mean, smooth = internal(), tensor()
             for k in range(wp.static(corners)):
-                mean += history[auxiliary.cell[a, k]]
-            flowed, _ = relax(stress(half), mean / real(corners), material, real(0.5) * dt)
-            half = join(velocity(half), flowed)
+                mean += history[auxiliary.cell[a, k]] / real(corners)
+                smooth += nodes.velocity_gradient[auxiliary.cell[a, k]] / real(corners)
+            rough = velocity_gradient(cell.gradient) - smooth
+            elastic = real(0.5) * dt * elastic_rate(rough, material.lame, material.shear, material.young)
+            flowed, _ = relax(stress(half) - elastic, mean, material, real(0.5) * dt)
+            flowed = real(wp.static(W_FLOW)) * flowed + real(wp.static(1.0 - W_FLOW)) * (stress(half) - elastic)
+            half = join(velocity(half), flowed + elastic)
         auxiliary.point[a].phi = half - phi + join(vector(), spherical(q))
         cells.cell[a] = cell
 

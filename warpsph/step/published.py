@@ -44,12 +44,12 @@ class PublishedFluxes:
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
         wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
 
-    def to_nodes(self, material, conditions, dt: float, pairs: PairList, auxiliary, nodes) -> None:
+    def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         inputs = [material, conditions, dt, pairs, auxiliary, nodes]
         wp.launch(self._to_nodes, nodes.point.shape[0], inputs, device=nodes.point.device)

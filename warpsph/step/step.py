@@ -77,6 +77,7 @@ class Stepper:
         load_kernels([centre, *(kernel for part in parts if part for kernel in part.kernels)], device)
 
         self.list_builds, self.shrinkage = 0, 1.0
+        self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
         self._build_lists()
         self.conditions.apply(self.nodes, 0.0, 0, self._health)
         self._initial_spin(scene)
@@ -102,13 +103,17 @@ class Stepper:
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         pairs = self._around_auxiliary.pairs
-        self._fluxes.to_auxiliary(self._parameters, dt, pairs, self.nodes, self.history, self.auxiliary)
+        self._fluxes.to_auxiliary(self._parameters, dt, self._courant(dt), pairs, self.nodes, self.history, self.auxiliary)
 
     def to_nodes(self, t_half: float, dt: float) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         self.conditions.set_time(t_half)
         table, pairs = self.conditions.table, self._around_nodes.pairs
-        self._fluxes.to_nodes(self._parameters, table, dt, pairs, self.auxiliary, self.nodes)
+        self._fluxes.to_nodes(self._parameters, table, dt, self._courant(dt), pairs, self.auxiliary, self.nodes)
+
+    def _courant(self, dt: float) -> float:
+        """c_p Δt over the least present spacing."""
+        return dt * self._per_spacing / self.shrinkage
 
     def first_non_finite(self) -> tuple[int, int] | None:
         """(node, step) where velocity or stress first stopped being finite, or None."""
