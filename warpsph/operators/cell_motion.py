@@ -25,25 +25,34 @@ class CellMotion(Motion):
 
     Args:
         lattice: the initial lattice.
+        ratio: smoothing length over spacing.
         support, skin, reference_density, continuum, precision, device: as for `Motion`.
     """
 
-    def __init__(self, lattice: Lattice, support, skin, reference_density, continuum, precision, device):
+    def __init__(self, lattice: Lattice, ratio: float, support, skin, reference_density, continuum, precision, device):
         super().__init__(len(lattice.nodes), support, skin, reference_density, continuum, precision, device)
         self._of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
         self._initial_volume = wp.array(lattice.cell_volumes(), dtype=precision.real, device=device)
+        self._ratio = ratio
+        self._cell_h = wp.zeros(len(lattice.cells), dtype=precision.real, device=device)
         self._shift, self._measure, self._share = _kernels(continuum, precision)
         self.kernels = (*self.kernels, self._shift, self._measure, self._share)
+
+    def mark(self, nodes, auxiliary) -> None:
+        """Remember where the nodes are now: the pair lists were just built for this."""
+        super().mark(nodes, auxiliary)
+        wp.copy(self._cell_h, auxiliary.smoothing_length)
 
     def move(self, nodes, auxiliary, dt: float) -> None:
         """x ← x + Δt v^{n+1/2}; then V, ρ and h of the cells, then of the nodes."""
         device, n, m = nodes.point.device, nodes.point.shape[0], auxiliary.point.shape[0]
         wp.launch(self._shift, n, inputs=[dt, nodes], device=device)
         wp.launch(self._centre, m, inputs=[nodes, auxiliary], device=device)
-        inputs = [self._reference_density, self._initial_volume, nodes, auxiliary]
+        inputs = [self._reference_density, self._initial_volume, self._ratio, self._support, 0.5 * self._skin]
+        inputs += [self._cell_h, nodes, auxiliary, self._outdated]
         wp.launch(self._measure, m, inputs=inputs, device=device)
-        inputs = [self._reference_density, self._initial_smoothing_length, self._support, 0.5 * self._skin]
-        inputs += [self._listed, self._listed_h, self._of_node, auxiliary, nodes, self._outdated]
+        inputs = [self._support, 0.5 * self._skin, self._listed, self._listed_h, self._of_node]
+        inputs += [auxiliary, nodes, self._outdated]
         wp.launch(self._share, n, inputs=inputs, device=device)
 
 
@@ -64,27 +73,45 @@ def _kernels(continuum, precision):
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
 
+    @wp.func
+    def longest(edges: tensor):
+        """The longest of a cell's edges and, over √2, of the diagonals of its faces: about its largest stretch."""
+        e = wp.transpose(edges)
+        most = real(0.0)
+        for b in range(wp.static(dim)):
+            most = wp.max(most, wp.length(e[b]))
+            for c in range(b):
+                diagonal = wp.max(wp.length(e[b] + e[c]), wp.length(e[b] - e[c]))
+                most = wp.max(most, real(wp.static(0.5**0.5)) * diagonal)
+        return most
+
     @wp.kernel(module="unique", enable_backward=False)
     def measure(
         reference_density: real,
         initial_volume: wp.array(dtype=real),
+        ratio: real,
+        support: real,
+        half_skin: real,
+        listed_h: wp.array(dtype=real),
         nodes: MaterialNodes,
         auxiliary: AuxiliaryNodes,
+        outdated: wp.array(dtype=wp.int32),
     ):
         a = wp.tid()
         edges = tensor()
         for k in range(wp.static(corners)):
             edges += wp.outer(nodes.point[auxiliary.cell[a, k]].x, side[k])
-        volume = wp.max(
-            determinant(real(wp.static(2.0 / corners)) * edges), real(SMALLEST) * initial_volume[a]
-        )
+        edges = real(wp.static(2.0 / corners)) * edges
+        h = ratio * longest(edges)
+        auxiliary.smoothing_length[a] = h
+        if support * wp.max(h - listed_h[a], real(0.0)) > half_skin:
+            outdated[0] = 1
+        volume = wp.max(determinant(edges), real(SMALLEST) * initial_volume[a])
         auxiliary.point[a].volume = volume
         auxiliary.density[a] = reference_density * initial_volume[a] / volume
 
     @wp.kernel(module="unique", enable_backward=False)
     def share(
-        reference_density: real,
-        initial_smoothing_length: wp.array(dtype=real),
         support: real,
         half_skin: real,
         listed: wp.array(dtype=vector),
@@ -95,17 +122,16 @@ def _kernels(continuum, precision):
         outdated: wp.array(dtype=wp.int32),
     ):
         i = wp.tid()
-        total, found = real(0.0), real(0.0)
+        total, found, h = real(0.0), real(0.0), real(0.0)
         for k in range(wp.static(corners)):
             a = of_node[i, k]
             if a >= 0:
                 total += auxiliary.point[a].volume
                 found += real(1.0)
+                h = wp.max(h, auxiliary.smoothing_length[a])
         volume = total / found
-        density = nodes.weight[i] / volume
-        h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / dim)))
         nodes.point[i].volume = volume
-        nodes.density[i] = density
+        nodes.density[i] = nodes.weight[i] / volume
         nodes.smoothing_length[i] = h
         u = nodes.displacement[i]
         if wp.length(u - listed[i]) + support * wp.max(h - listed_h[i], real(0.0)) > half_skin:

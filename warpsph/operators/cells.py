@@ -136,19 +136,20 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
 
     @wp.func
     def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
-        value, gradient, checkerboard, found = phi(), phi_gradient(), phi(), real(0.0)
+        value, gradient, checkerboard, frame, found = phi(), phi_gradient(), phi(), tensor(), real(0.0)
         for k in range(wp.static(corners)):
             a = cells.of_node[i, k]
             if a >= 0:
                 found += real(1.0)
                 value += auxiliary[a].phi
                 gradient += cells.cell[a].gradient
+                frame += cells.cell[a].frame
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
                     near = share * cells.cell[a].squareness
                     gradient += beyond_middle(modes, side[k], near) * cells.cell[a].frame
                     checkerboard += modes * sign[k]
-        return value / found, gradient / found, checkerboard / found
+        return value / found, gradient / found, checkerboard / found, frame / found
 
     return CellTypes(Cell, Cells, describe, gather)
 

@@ -32,7 +32,7 @@ class NoMotion:
         """Never."""
         return False
 
-    def mark(self, nodes) -> None:
+    def mark(self, nodes, auxiliary) -> None:
         """Nothing."""
 
 
@@ -57,7 +57,7 @@ class Motion:
         self._centre = centre_kernel(continuum, precision)
         self.kernels = (self._kernel, self._centre)
 
-    def mark(self, nodes) -> None:
+    def mark(self, nodes, auxiliary) -> None:
         """Remember where the nodes are now: the pair lists were just built for this."""
         if self._initial_smoothing_length is None:
             self._initial_smoothing_length = wp.clone(nodes.smoothing_length)

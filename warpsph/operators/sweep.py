@@ -8,6 +8,7 @@ gradient for any value φ_I of the point itself. The sums are taken of differenc
 neighbours' (the one the target had last): in float32 the sums of the values themselves would cancel.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -27,14 +28,20 @@ class Sweep:
     """The functions of one pass.
 
     Attributes:
-        collect: (target index, its x and h, base value, pair list, source points) → Sums.
+        collect: (target index, its x and metric M, base value, pair list, source points) → Sums. ξ² = |M r|²: M = 1/h for
+            a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes MᵀM out of ∇W again.
         value: Sums → Shepard value; the base value where no neighbour is left.
+        round_metric: h → 1/h.
+        cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in adaptive
+            SPH, Owen et al. 1998); 1/h where they have folded.
         gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
     """
 
     collect: wp.Function
     value: wp.Function
     gradient: wp.Function
+    round_metric: wp.Function
+    cell_metric: Callable[[float], wp.Function]
 
 
 # A neighbour on the very edge of the support is outside, whatever its last bits say: at h = 0.5 Δx the Gaussian's
@@ -62,14 +69,14 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         g_phi: phi_gradient  # Σ V (φ_J − base) ⊗ ∇W
 
     @wp.func
-    def collect(target: int, x: vector, h: real, base: phi, pairs: PairList, sources: wp.array(dtype=Point)):
+    def collect(target: int, x: vector, metric: tensor, base: phi, pairs: PairList, sources: wp.array(dtype=Point)):
         sums = Sums()
         sums.base = base
-        per_h2 = real(1.0) / (h * h)
         for k in range(pairs.start[target], pairs.start[target + 1]):
             neighbour = sources[pairs.index[k]]
             r = neighbour.x - x
-            s = wp.dot(r, r) * per_h2
+            xi = metric * r
+            s = wp.dot(xi, xi)
             if s < real(support_squared):
                 w, g = weights(s)
                 w *= neighbour.volume
@@ -93,4 +100,20 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     def gradient(sums: Sums, own: phi):
         return (sums.g_phi - wp.outer(own - sums.base, sums.g)) * inverse(sums.g_x)
 
-    return Sweep(collect, value, gradient)
+    @wp.func
+    def round_metric(h: real):
+        metric = tensor()
+        for k in range(wp.static(continuum.dim)):
+            metric[k, k] = real(1.0) / h
+        return metric
+
+    def cell_metric(ratio: float):
+        @wp.func
+        def metric_of(frame: tensor, h: real):
+            if wp.ddot(frame, frame) <= real(0.0):
+                return round_metric(h)
+            return frame / real(ratio)
+
+        return metric_of
+
+    return Sweep(collect, value, gradient, round_metric, cell_metric)

@@ -33,7 +33,6 @@ from ..scene.scene import Scene
 # with 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
 VELOCITY_SHARE = 1.0
 STRESS_SHARE = 0.3
-W_FLOW = float(__import__("os").environ.get("WF","1"))
 MARGIN = 0.9
 
 
@@ -73,13 +72,14 @@ class CompatibleFluxes:
     def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device):
         lattice, kernel = scene.lattice, scene.numerics.kernel
         continuum, moves = lattice.continuum, scene.large_displacements
+        ratio = scene.numerics.smoothing_ratio
         types = cell_types(continuum, precision)
         self._dim = lattice.dim
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, kernel, law)
-        self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, law.Parameters, moves, conditions)
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, kernel, ratio, law)
+        self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, ratio, law.Parameters, moves, conditions)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
     def to_auxiliary(self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary) -> None:
@@ -96,7 +96,7 @@ class CompatibleFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, law: Law):
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, ratio: float, law: Law):
     Parameters, relax, internal = law.Parameters, law.relax, precision.vec(max(1, len(law.history)))
     corners = 2**continuum.dim
     types, cells_types = node_types(continuum, precision), cell_types(continuum, precision)
@@ -107,6 +107,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     velocity, stress, tensor = phi_of.velocity, phi_of.stress, types.tensor
     elastic_rate = kinematics(continuum, precision).elastic_rate
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    metric_of = parts.cell_metric(ratio)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -123,7 +124,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
         a = wp.tid()
         point = auxiliary.point[a]
         phi, cell = describe(a, auxiliary, nodes.point)  # 3
-        sums = collect(a, point.x, auxiliary.smoothing_length[a], phi, pairs, nodes.point)
+        sums = collect(a, point.x, metric_of(cell.frame, auxiliary.smoothing_length[a]), phi, pairs, nodes.point)
         cell.gradient = gradient(sums, phi)
         minus_div_f = rate(cell.gradient, real(1.0) / auxiliary.density[a], material)  # 4-5
         volumetric = wp.trace(velocity_gradient(cell.gradient))
@@ -137,7 +138,6 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
             rough = velocity_gradient(cell.gradient) - smooth
             elastic = real(0.5) * dt * elastic_rate(rough, material.lame, material.shear, material.young)
             flowed, _ = relax(stress(half) - elastic, mean, material, real(0.5) * dt)
-            flowed = real(wp.static(W_FLOW)) * flowed + real(wp.static(1.0 - W_FLOW)) * (stress(half) - elastic)
             half = join(velocity(half), flowed + elastic)
         auxiliary.point[a].phi = half - phi + join(vector(), spherical(q))
         cells.cell[a] = cell
@@ -150,6 +150,7 @@ def _to_nodes_kernel(
     continuum: Continuum,
     precision: Precision,
     kernel: str,
+    ratio: float,
     Parameters: type,
     moves: bool,
     conditions: ConditionTypes,
@@ -160,7 +161,7 @@ def _to_nodes_kernel(
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply, Cells, gather = conditions.Table, conditions.apply, cells_types.Cells, cells_types.gather
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
-    collect, gradient = parts.collect, parts.gradient
+    collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -176,9 +177,9 @@ def _to_nodes_kernel(
     ):
         i = wp.tid()
         point = nodes.point[i]
-        increment, grad_s, checkerboard = gather(i, cells, auxiliary.point, share)
+        increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share)
         phi_half = apply(i, point.phi + increment, conditions)  # 7
-        sums = collect(i, point.x, nodes.smoothing_length[i], types.phi(), pairs, auxiliary.point)
+        sums = collect(i, point.x, metric_of(frame, nodes.smoothing_length[i]), types.phi(), pairs, auxiliary.point)
         grad, volume_ratio = to_half_step(grad_s + gradient(sums, phi_half - point.phi), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 

@@ -61,6 +61,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
+    round_metric = parts.round_metric
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_auxiliary(
@@ -68,7 +69,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     ):
         a = wp.tid()
         point = auxiliary.point[a]
-        sums = collect(a, point.x, auxiliary.smoothing_length[a], point.phi, pairs, nodes.point)
+        sums = collect(a, point.x, round_metric(auxiliary.smoothing_length[a]), point.phi, pairs, nodes.point)
         phi = value(sums)  # 3
         minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
         auxiliary.point[a].phi = phi + real(0.5) * dt * minus_div_f  # 6
@@ -93,6 +94,7 @@ def _to_nodes_kernel(
     Table, apply = conditions.Table, conditions.apply
     rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
+    round_metric = parts.round_metric
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
@@ -107,7 +109,7 @@ def _to_nodes_kernel(
     ):
         i = wp.tid()
         point = nodes.point[i]
-        sums = collect(i, point.x, nodes.smoothing_length[i], point.phi, pairs, auxiliary.point)
+        sums = collect(i, point.x, round_metric(nodes.smoothing_length[i]), point.phi, pairs, auxiliary.point)
         phi_half = apply(i, value(sums), conditions)  # 7
         grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9

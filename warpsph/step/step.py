@@ -57,7 +57,7 @@ class Stepper:
             skin = SKIN * lattice.spacing
             moving = (support, skin, scene.material.density, continuum, precision, device)
             cells = numerics.velocity_scheme == "compatible"
-            self._motion = CellMotion(lattice, *moving) if cells else Motion(n, *moving)
+            self._motion = CellMotion(lattice, numerics.smoothing_ratio, *moving) if cells else Motion(n, *moving)
             if cells:
                 self._spacing = Spacing(self._m, continuum, precision, numerics.kernel, device)
         search = (support, lattice.spacing, skin)
@@ -123,7 +123,7 @@ class Stepper:
     def _build_lists(self) -> None:
         self._around_auxiliary.build()
         self._around_nodes.build()
-        self._motion.mark(self.nodes)
+        self._motion.mark(self.nodes, self.auxiliary)
         self.conditions.locate(self.nodes)
         if self._spacing:
             self.shrinkage = self._spacing.shrinkage(self._around_auxiliary.pairs, self.nodes, self.auxiliary)
