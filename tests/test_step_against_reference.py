@@ -1,5 +1,7 @@
 """One step on a random smooth state against the slow NumPy loops of `tests.reference`."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -97,7 +99,7 @@ def bare_normals(lattice):
     top = np.flatnonzero(edge("top").nodes(lattice))
     top = top[np.argsort(lattice.nodes[top, 0])]
     normals = {}
-    for a, b in zip(top[:-1], top[1:], strict=True):
+    for a, b in itertools.pairwise(top):
         if lattice.nodes[a, 0] <= 0.62:
             along = lattice.nodes[b] - lattice.nodes[a]
             normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)

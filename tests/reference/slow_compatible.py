@@ -1,7 +1,8 @@
 """One step of the compatible scheme, 2D plane strain, slow and plain on purpose.
 
-Written from docs/velocity_steps.md and the modules' texts, in loops over cells and nodes; what is the same physics as in
-the published step (corrected gradients, the law, RK4 sources) is that of `slow_step`. Conventions are those there.
+Written from docs/velocity_steps.md and the modules' texts, in loops over cells and nodes; what is the same physics
+as in the published step (corrected gradients, the law, RK4 sources) is that of `slow_step`. Conventions are those
+there.
 
 A cell's corners are numbered 00, 01, 10, 11 along its own axes (1, 2).
 """
@@ -51,7 +52,7 @@ def thickness(corners):
 
 
 def linear_fit(corners, f):
-    """(mean, gradient (k, 2), checkerboard (k,)): f = mean + gradient·(x − middle) + checkerboard·(±1), exactly."""
+    """(mean, gradient, checkerboard) of f = mean + gradient·(x − middle) + checkerboard·(±1), exactly."""
     middle = sum(corners) / 4.0
     system = np.array([[1.0, *(corner - middle), s] for corner, s in zip(corners, ALTERNATING, strict=True)])
     mean, slope_x, slope_y, checkerboard = np.linalg.solve(system, f)
@@ -62,8 +63,8 @@ def cells_around(cells, n):
     """For each node [(cell, which of its corners the node is)]."""
     around = [[] for _ in range(n)]
     for C, members in enumerate(cells):
-        for k, I in enumerate(members):
-            around[I].append((C, k))
+        for k, i in enumerate(members):
+            around[i].append((C, k))
     return around
 
 
@@ -85,7 +86,7 @@ def overstress(F, Y, modulus, time, model):
 
 
 def relax(sigma, eps, time, model):
-    """Flow alone, with Y's mean over the time, found by `MEAN_YIELD_ITERATIONS` of the implicit equation for the strain."""
+    """Flow alone at the mean Y of the time; the strain from so many iterations of its implicit equation."""
     Y = yield_size(eps, model)
     deviator = sigma - np.trace(sigma) / 3.0 * np.eye(3)
     q = np.sqrt(1.5 * np.sum(deviator**2))
@@ -112,18 +113,18 @@ def turned(sigma, L, time):
 def sources(v, sigma, eps, L, t0, half, model):
     """Steps 1-2 and 11-12, by the scheme of choice for the stress. Returns v, sigma, eps."""
     v, sigma, eps = v.copy(), sigma.copy(), eps.copy()
-    for I in range(len(v)):
-        spin = np.zeros((2, 2)) if model["small_strain"] else L[I]
+    for i in range(len(v)):
+        spin = np.zeros((2, 2)) if model["small_strain"] else L[i]
         if model["source_scheme"] == "analytic":
-            stress, eps[I] = relax(turned(full(sigma[I]), spin, half), eps[I], half, model)
-            sigma[I] = components(stress)
+            stress, eps[i] = relax(turned(full(sigma[i]), spin, half), eps[i], half, model)
+            sigma[i] = components(stress)
         else:
             L3 = in_space(spin)
             omega = 0.5 * (L3 - L3.T)
-            y = np.append(sigma[I], eps[I])
+            y = np.append(sigma[i], eps[i])
             y = rk4(lambda y, t, omega=omega: stress_source(y, omega, model), y, t0, half)
-            sigma[I], eps[I] = y[:4], y[4]
-        v[I] = rk4(lambda v, t: velocity_source(v, t, model), v[I], t0, half)
+            sigma[i], eps[i] = y[:4], y[4]
+        v[i] = rk4(lambda v, t: velocity_source(v, t, model), v[i], t0, half)
     return v, sigma, eps
 
 
@@ -132,10 +133,10 @@ def sources(v, sigma, eps, L, t0, half, model):
 # ---------------------------------------------------------------------------------------------------------
 
 
-def tractions_that_vanish(I, model):
+def tractions_that_vanish(i, model):
     """[(direction u, normal n)] with u · σ n = 0 at a node of the test box (see `boundary_conditions`)."""
     x, y = np.eye(2)
-    left, bottom, right, top = (bool(model[side][I]) for side in ("left", "bottom", "right", "top"))
+    left, bottom, right, top = (bool(model[side][i]) for side in ("left", "bottom", "right", "top"))
     free_directions = [u for u, held in ((x, left or bottom), (y, bottom or top)) if not held]
     pairs = []
     if left:
@@ -144,13 +145,13 @@ def tractions_that_vanish(I, model):
         pairs.append((x, y))
     if right:
         pairs += [(u, x) for u in free_directions]
-    if I in model["bare_normals"]:
-        pairs += [(u, model["bare_normals"][I]) for u in free_directions]
+    if i in model["bare_normals"]:
+        pairs += [(u, model["bare_normals"][i]) for u in free_directions]
     return pairs
 
 
 def unloaded(sigma, pairs, model):
-    """Of the strains Σ μ_k sym(u_k n_k), which work on these tractions alone, the ones whose stress takes them away."""
+    """Of the strains Σ μ_k sym(u_k n_k), the ones that work on these tractions, those that take them away."""
     if not pairs:
         return sigma
     stresses = []
@@ -166,16 +167,16 @@ def unloaded(sigma, pairs, model):
 
 
 def boundary_conditions(v, sigma, t, model):
-    """The test box: left a roller, bottom fixed, right free, top moved along y beyond some x and bare before it."""
+    """The test box: left a roller, bottom fixed, right free, top moved along y beyond some x, bare before it."""
     v, sigma = v.copy(), sigma.copy()
-    for I in range(len(v)):
-        if model["top"][I]:
-            v[I, 1] = model["top_velocity"](t)
-        if model["left"][I]:
-            v[I, 0] = 0.0
-        if model["bottom"][I]:
-            v[I] = 0.0
-        sigma[I] = unloaded(sigma[I], tractions_that_vanish(I, model), model)
+    for i in range(len(v)):
+        if model["top"][i]:
+            v[i, 1] = model["top_velocity"](t)
+        if model["left"][i]:
+            v[i, 0] = 0.0
+        if model["bottom"][i]:
+            v[i] = 0.0
+        sigma[i] = unloaded(sigma[i], tractions_that_vanish(i, model), model)
     return v, sigma
 
 
@@ -205,12 +206,12 @@ def cells_half_step(x, nodes, aux, v_s, sigma_s, L, dt, courant, model):
     phi_s = np.hstack([v_s, sigma_s])
     found = []
     for C, members in enumerate(model["cells"]):
-        corners, rho = [x[I] for I in members], aux["rho"][C]
+        corners, rho = [x[i] for i in members], aux["rho"][C]
         mean, _, checkerboard = linear_fit(corners, phi_s[members])
         grad = gradient(aux, C, mean, nodes, phi_s, model["kernel"])
         div_v, div_sigma = div_f(grad[:2], grad[2:], rho, model)
         q = bulk_viscous_pressure(
-            grad[0, 0] + grad[1, 1], [L[I, 0, 0] + L[I, 1, 1] for I in members], corners, rho, dt, courant
+            grad[0, 0] + grad[1, 1], [L[i, 0, 0] + L[i, 1, 1] for i in members], corners, rho, dt, courant
         )
         change = -0.5 * dt * np.append(div_v, div_sigma) + q * np.array([0.0, 0.0, 1.0, 1.0, 0.0, 1.0])
         frame = np.linalg.inv(axes_of(corners).T)  # ∇ξ_a in row a
@@ -223,32 +224,32 @@ def nodes_full_step(nodes, aux, cells, v_s, sigma_s, t, dt, courant, model):
     n, kappa = len(v_s), corner_share(courant)
     around = cells_around(model["cells"], n)
     phi_s = np.hstack([v_s, sigma_s])
-    own_change = np.array([sum(cells[C][3] for C, _ in around[I]) / len(around[I]) for I in range(n)])
+    own_change = np.array([sum(cells[C][3] for C, _ in around[i]) / len(around[i]) for i in range(n)])
     half = phi_s + own_change
     v_half, sigma_half = boundary_conditions(half[:, :2], half[:, 2:], t + 0.5 * dt, model)
     half = np.hstack([v_half, sigma_half])
     changes = np.array([change for _, _, _, change in cells])
 
     adv, L_new = np.zeros((n, 6)), np.zeros((n, 2, 2))
-    for I in range(n):
+    for i in range(n):
         grad, seen = np.zeros((6, 2)), np.zeros(6)
-        for C, k in around[I]:
+        for C, k in around[i]:
             cell_grad, checkerboard, frame, _ = cells[C]
-            grad += cell_grad / len(around[I])
+            grad += cell_grad / len(around[i])
             for a, b in ((0, 1), (1, 0)):  # ∂/∂ξ_a of checkerboard·(2ξ_1)(2ξ_2) at 2ξ_b = κ·end
                 along = 2.0 * checkerboard * kappa * ENDS[k, b]
-                grad += np.outer(along, frame[a]) / len(around[I])
-            seen += ALTERNATING[k] * checkerboard / len(around[I])
-        grad += gradient(nodes, I, half[I] - phi_s[I], aux, changes, model["kernel"])
-        rho = nodes["rho"][I]
+                grad += np.outer(along, frame[a]) / len(around[i])
+            seen += ALTERNATING[k] * checkerboard / len(around[i])
+        grad += gradient(nodes, i, half[i] - phi_s[i], aux, changes, model["kernel"])
+        rho = nodes["rho"][i]
         if not model["small_strain"]:
             stretch = np.eye(2) + 0.5 * dt * grad[:2]
             grad, rho = grad @ np.linalg.inv(stretch), rho / np.linalg.det(stretch)
         div_v, div_sigma = div_f(grad[:2], grad[2:], rho, model)
-        adv[I] = phi_s[I] - dt * np.append(div_v, div_sigma)
-        adv[I, :2] -= VELOCITY_SHARE * seen[:2]
-        adv[I, 2:] -= STRESS_SHARE * seen[2:]
-        L_new[I] = grad[:2]
+        adv[i] = phi_s[i] - dt * np.append(div_v, div_sigma)
+        adv[i, :2] -= VELOCITY_SHARE * seen[:2]
+        adv[i, 2:] -= STRESS_SHARE * seen[2:]
+        L_new[i] = grad[:2]
     return adv[:, :2], adv[:, 2:], v_half, L_new
 
 
@@ -264,30 +265,30 @@ def configuration(x, rho, aux_h, model):
     m = len(model["cells"])
     aux = {"x": np.zeros((m, 2)), "rho": np.zeros(m), "V": np.zeros(m), "h": aux_h}
     for C, members in enumerate(model["cells"]):
-        aux["x"][C] = sum(x[I] for I in members) / 4.0
+        aux["x"][C] = sum(x[i] for i in members) / 4.0
         if model["small_strain"]:
-            aux["rho"][C] = sum(rho[I] for I in members) / 4.0
-            aux["V"][C] = sum(V[I] for I in members) / 4.0
+            aux["rho"][C] = sum(rho[i] for i in members) / 4.0
+            aux["V"][C] = sum(V[i] for i in members) / 4.0
         else:
-            aux["V"][C] = area([x[I] for I in members])
-            initial = area([model["x0"][I] for I in members])
+            aux["V"][C] = area([x[i] for i in members])
+            initial = area([model["x0"][i] for i in members])
             aux["rho"][C] = model["rho0"] * initial / aux["V"][C]
     return nodes, aux
 
 
 def densities(x, model):
     """Step 14: ρ₀ times the mean volume a node's cells had, over the mean they have now."""
-    volume, initial = ([area([p[I] for I in members]) for members in model["cells"]] for p in (x, model["x0"]))
+    volume, initial = ([area([p[i] for i in members]) for members in model["cells"]] for p in (x, model["x0"]))
     rho = np.zeros(len(x))
-    for I, cells in enumerate(cells_around(model["cells"], len(x))):
-        rho[I] = model["rho0"] * sum(initial[C] for C, _ in cells) / sum(volume[C] for C, _ in cells)
+    for i, cells in enumerate(cells_around(model["cells"], len(x))):
+        rho[i] = model["rho0"] * sum(initial[C] for C, _ in cells) / sum(volume[C] for C, _ in cells)
     return rho
 
 
 def slow_compatible_step(state: dict, model: dict, t: float, dt: float) -> dict:
     """The state at t + dt from the state at t; the input is not changed.
 
-    Besides what `slow_step` needs: `u`, displacements, which x is too coarse for in float32, and `aux_h`, the cells' h.
+    Besides what `slow_step` needs: displacements `u`, which x is too coarse for in float32, and `aux_h` of cells.
     """
     x, L = state["x"], state["L"]
     courant = dt * model["wave_speed"] / model["spacing"]
