@@ -155,10 +155,10 @@ def expected_spacing(kernel, edges, h):
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize(("dim", "stretch"), [(1, 1.0), (2, 1.0), (3, 1.0), (2, 0.8), (2, 0.9), (3, 0.8)])
 def test_spacing_is_twice_the_root_of_the_second_moment(precision, dim, stretch, kernel):
-    """To rounding where all axes are alike; where the power method has to choose to 2 %, and never below."""
+    """To rounding where all axes are alike; where one is shorter to 0.3 %, and never below."""
     spacing, edges, h = spacing_inside(dim, kernel, precision, stretch)
     expected = expected_spacing(kernel, edges, h[len(h) // 2])
-    upper = 10 * ROUNDING[precision] if stretch == 1.0 else 0.02
+    upper = 10 * ROUNDING[precision] if stretch == 1.0 else 0.003
     assert -10 * ROUNDING[precision] <= spacing / expected - 1.0 <= upper
 
 
@@ -168,3 +168,24 @@ def test_spacing_of_a_bar_is_the_limit_of_the_courant_number(precision):
     weight = SMOOTHING_FUNCTIONS["gaussian"](PRECISIONS["float64"])
     moment = second_moment(weight, PRECISIONS["float64"], 0.6, KERNELS["gaussian"].support)
     assert spacing == pytest.approx(2.0 * np.sqrt(moment) * edges[0], rel=ROUNDING[precision])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_spacing_does_not_depend_on_the_direction_of_the_compression(precision, dim):
+    """A lattice compressed by 0.8 and turned, whichever way: across (1, 1.3) as well as along an axis."""
+    straight, found = np.eye(dim), []
+    straight[0, 0] = 0.8
+    for angle in np.deg2rad([0.0, 20.0, -37.57, 52.43, 90.0]):
+        turn = np.eye(dim)
+        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        simulation = simulation_of(dim, "cpu", precision, mapped=None)
+        found.append(shrinkage_after(simulation, turn @ straight))
+    np.testing.assert_allclose(found, found[0], rtol=1e3 * ROUNDING[precision])
+    assert 0.75 < found[0] < 0.9
+
+
+def test_a_cell_that_sees_no_node_does_not_stop_the_run(precision):
+    """Pulled to four times its length at a constant volume, its corners are beyond its support."""
+    simulation = simulation_of(2, "cpu", precision, mapped=None, smoothing_ratio=0.6)
+    assert shrinkage_after(simulation, np.diag([4.0, 0.25])) > 0.0
+    assert np.isfinite(simulation.time_step_limit)
