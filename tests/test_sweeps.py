@@ -16,14 +16,17 @@ from warpsph.operators.sweep import sweep
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
 from warpsph.scene.material import Elastic as ElasticMaterial
 from warpsph.scene.material import PerzynaVonMises
-from warpsph.step.velocity_schemes import VELOCITY_SCHEMES as VELOCITY_TABLE
+from warpsph.step.fluxes import FLUXES
+from warpsph.step.published import PublishedFluxes
+from warpsph.step.velocity_schemes import VELOCITY_SCHEMES as PUBLISHED_VELOCITIES
 
 SOFT = Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0)
 
 
 def test_names_a_scene_may_use_are_those_that_exist_below():
     assert set(KERNELS) == set(SMOOTHING_FUNCTIONS)
-    assert set(VELOCITY_SCHEMES) == set(VELOCITY_TABLE)
+    assert set(VELOCITY_SCHEMES) == set(FLUXES)
+    assert {name for name, fluxes in FLUXES.items() if fluxes is PublishedFluxes} == set(PUBLISHED_VELOCITIES)
     assert set(SOURCE_SCHEMES) == set(SOURCE_TABLE)
     assert set(LAWS) == {ElasticMaterial, PerzynaVonMises}
 

@@ -1,8 +1,8 @@
 """How much closer than at the start the nodes are, as far as the time step can feel it.
 
-A corrected gradient multiplies neighbours' values by G_J = A⁻¹ g_J r_J, A = Σ g_J r_J r_J, g_J = V_J (−W′/ξ). By Cauchy
-and Schwarz Σ |e · G_J| ≤ √(Σ g/λ) along any direction e, λ the least eigenvalue of A, with equality on a lattice: waves are
-stable for c_p Δt ≤ 2 √(λ/Σ g). That is METHOD's 2 √m₂ Δx, wherever the nodes now are.
+A corrected gradient multiplies neighbours' values by G_J = A⁻¹ g_J r_J, A = Σ g_J r_J r_J, g_J = V_J (−W′/ξ). By
+Cauchy and Schwarz Σ |e · G_J| ≤ √(Σ g/λ) along any direction e, λ the least eigenvalue of A, with equality on a
+lattice: waves are stable for c_p Δt ≤ 2 √(λ/Σ g). That is METHOD's 2 √m₂ Δx, wherever the nodes now are.
 """
 
 from functools import cache
@@ -21,7 +21,7 @@ from .sweep import EDGE
 
 # Cells that fold have no spacing left; the step is not shortened beyond this share, or a run would never end.
 SMALLEST = 0.25
-ITERATIONS = 12  # of the power method; with d ≤ 3 the estimate is good to a per cent
+DOUBLINGS = 7  # A⁻ᵏ with k = 2⁷: tr(A⁻ᵏ⁻¹)/tr(A⁻ᵏ) misses its largest eigenvalue by at most (d − 1)/(e k), 0.6 %
 
 
 class Spacing:
@@ -52,10 +52,9 @@ class Spacing:
 @cache
 def _spacing_kernel(continuum: Continuum, precision: Precision, kernel: str):
     types, dim, real = node_types(continuum, precision), continuum.dim, precision.real
-    tensor, vector, inverse = types.tensor, types.vector, inverse_of(dim, precision)
+    tensor, inverse = types.tensor, inverse_of(dim, precision)
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     support_squared = EDGE * KERNELS[kernel].support ** 2
-    start = vector(*[1.0 + 0.3 * a for a in range(dim)])
 
     @wp.kernel(module="unique", enable_backward=False)
     def spacing(
@@ -76,12 +75,14 @@ def _spacing_kernel(continuum: Continuum, precision: Precision, kernel: str):
                 g *= neighbour.volume
                 total += g
                 moments += g * wp.outer(r, r)
-        stiff, along = inverse(moments), start  # the largest eigenvalue of A⁻¹ by the power method
-        largest = real(0.0)
-        for _ in range(ITERATIONS):
-            along = stiff * along
-            largest = wp.length(along)
-            along = along / largest
-        result[a] = real(2.0) / wp.sqrt(largest * total)
+        if wp.trace(moments) <= real(0.0):
+            result[a] = real(wp.inf)  # no neighbour is left that a step could be too long for
+            return
+        stiff = inverse(moments)
+        power = stiff / wp.trace(stiff)
+        for _ in range(DOUBLINGS):
+            power = power * power
+            power = power / wp.trace(power)
+        result[a] = real(2.0) / wp.sqrt(wp.trace(stiff * power) * total)
 
     return spacing

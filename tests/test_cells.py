@@ -1,0 +1,296 @@
+"""Means over cells, their modes, and the pressure at fronts, against fields given by a formula."""
+
+import itertools
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warpsph import Box
+from warpsph.ground.precision import PRECISIONS
+from warpsph.nodes.node_sets import node_types
+from warpsph.operators.cells import cell_types, cells_of_nodes
+from warpsph.operators.shock import ROUGH, front_pressure
+from warpsph.scene import CONTINUA
+
+DIMENSIONS = [1, 2, 3]
+ROUNDING = {"float64": 1e-13, "float32": 1e-4}
+CELLS = (4, 3, 3)
+
+
+def index_of(lattice):
+    """Integer coordinates of the nodes of the unmapped box, shape (n, d)."""
+    return np.round(lattice.nodes).astype(int)
+
+
+def box(dim):
+    return Box(tuple(float(c) for c in CELLS[:dim]), 1.0).lattice()
+
+
+def distorted(lattice):
+    """No cell is a parallelogram any more."""
+    shift = np.random.default_rng(8).uniform(-0.15, 0.15, size=lattice.nodes.shape)
+    return lattice.with_nodes(lattice.nodes + shift)
+
+
+def sheared(lattice):
+    """All cells are parallelepipeds; returns the lattice and F."""
+    dim = lattice.nodes.shape[1]
+    F = np.eye(dim) + np.random.default_rng(9).uniform(-0.25, 0.25, size=(dim, dim))
+    return lattice.with_nodes(lattice.nodes @ F.T), F
+
+
+@dataclass
+class Seen:
+    """What `describe` and `gather` find of a field."""
+
+    mean: np.ndarray  # of each cell
+    modes: np.ndarray
+    value: np.ndarray  # at each node: mean over its cells of their means
+    gradient: np.ndarray
+    checkerboard: np.ndarray
+
+
+@cache
+def probes(dim, precision):
+    """Kernels that run `describe` on all cells and `gather` on all nodes."""
+    continuum, real = CONTINUA[dim], PRECISIONS[precision]
+    types, cell_of = node_types(continuum, real), cell_types(continuum, real)
+    describe, gather, Cells = cell_of.describe, cell_of.gather, cell_of.Cells
+    phi, phi_gradient, Point, AuxiliaryNodes = types.phi, types.phi_gradient, types.Point, types.AuxiliaryNodes
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def describe_all(
+        nodes: wp.array(dtype=Point),
+        gradients: wp.array(dtype=phi_gradient),
+        auxiliary: AuxiliaryNodes,
+        cells: Cells,
+    ):
+        a = wp.tid()
+        mean, cell = describe(a, auxiliary, nodes)
+        cell.gradient = gradients[a]
+        auxiliary.point[a].phi = mean
+        cells.cell[a] = cell
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def gather_all(
+        auxiliary: AuxiliaryNodes,
+        cells: Cells,
+        share: real.real,
+        values: wp.array(dtype=phi),
+        gradients: wp.array(dtype=phi_gradient),
+        checkerboards: wp.array(dtype=phi),
+    ):
+        i = wp.tid()
+        value, gradient, checkerboard = gather(i, cells, auxiliary.point, share)
+        values[i] = value
+        gradients[i] = gradient
+        checkerboards[i] = checkerboard
+
+    return describe_all, gather_all, types, cell_of
+
+
+def see(lattice, field, precision, middle_gradient=None, share=1.0):
+    """Run both on node values (n, d + s) and gradients in the middle of the cells (m, d + s, d)."""
+    describe_all, gather_all, types, cell_of = probes(lattice.dim, precision)
+    phi, phi_gradient, Point = types.phi, types.phi_gradient, types.Point
+    n, m = len(lattice.nodes), len(lattice.cells)
+    points = np.zeros(n, dtype=Point.numpy_dtype())
+    points["x"], points["phi"] = lattice.nodes, field
+    auxiliary, cells = types.AuxiliaryNodes(), cell_of.Cells()
+    auxiliary.point = wp.zeros(m, dtype=Point, device="cpu")
+    auxiliary.cell = wp.array(lattice.cells, dtype=wp.int32, device="cpu")
+    cells.cell = wp.zeros(m, dtype=cell_of.Cell, device="cpu")
+    cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device="cpu")
+    if middle_gradient is None:
+        middle_gradient = np.zeros((m, types.size, lattice.dim))
+    gradients = wp.array(middle_gradient, dtype=phi_gradient, device="cpu")
+    wp.launch(
+        describe_all, m, [wp.array(points, dtype=Point, device="cpu"), gradients, auxiliary, cells], device="cpu"
+    )
+    outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in (phi, phi_gradient, phi)]
+    wp.launch(gather_all, n, [auxiliary, cells, share], outputs, device="cpu")
+    modes = cells.cell.numpy()["modes"].reshape(m, types.size, -1)
+    return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
+
+
+def size_of(dim):
+    return dim + CONTINUA[dim].stress_size
+
+
+def mean_over_cells(lattice, of_cells):
+    """Of each node, over the cells it is a corner of."""
+    return np.array([of_cells[(lattice.cells == i).any(axis=1)].mean(axis=0) for i in range(len(lattice.nodes))])
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_a_linear_field_on_distorted_cells_is_exact_and_has_no_modes(precision, dim):
+    rng = np.random.default_rng(1)
+    slope, constant = rng.normal(size=(size_of(dim), dim)), rng.normal(size=size_of(dim))
+    lattice = distorted(box(dim))
+    middle = lattice.nodes[lattice.cells].mean(axis=1)
+    given = np.tile(slope, (len(middle), 1, 1))
+    seen = see(lattice, lattice.nodes @ slope.T + constant, precision, given)
+    close = {"rtol": 0.0, "atol": 10 * ROUNDING[precision]}
+    np.testing.assert_allclose(seen.mean, middle @ slope.T + constant, **close)
+    np.testing.assert_allclose(seen.modes, 0.0, **close)
+    np.testing.assert_allclose(seen.value, mean_over_cells(lattice, middle) @ slope.T + constant, **close)
+    np.testing.assert_allclose(seen.gradient, np.tile(slope, (len(lattice.nodes), 1, 1)), **close)
+    np.testing.assert_allclose(seen.checkerboard, 0.0, **close)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_gradient_of_a_multilinear_field_is_exact_on_the_way_to_the_corner(precision, dim, share):
+    """Products of two and of three different coordinates of sheared cells: their gradient varies within a cell."""
+    rng = np.random.default_rng(2)
+    lattice, F = sheared(box(dim))
+    products = [s for size in range(1, dim + 1) for s in itertools.combinations(range(dim), size)]
+    weights = rng.normal(size=(size_of(dim), len(products)))
+
+    def field(x):
+        xi = x @ np.linalg.inv(F).T
+        return np.stack([xi[:, s].prod(axis=1) for s in products], axis=1) @ weights.T
+
+    def gradient(x):
+        xi = x @ np.linalg.inv(F).T
+        by_xi = np.zeros((len(x), len(products), dim))
+        for k, s in enumerate(products):
+            for a in s:
+                by_xi[:, k, a] = xi[:, [b for b in s if b != a]].prod(axis=1)
+        return np.einsum("kp,npa,aj->nkj", weights, by_xi, np.linalg.inv(F))
+
+    middle = lattice.nodes[lattice.cells].mean(axis=1)
+    seen = see(lattice, field(lattice.nodes), precision, gradient(middle), share)
+    for i, x in enumerate(lattice.nodes):
+        own = middle[(lattice.cells == i).any(axis=1)]
+        expected = gradient(own + share * (x - own)).mean(axis=0)
+        np.testing.assert_allclose(seen.gradient[i], expected, rtol=0.0, atol=1e3 * ROUNDING[precision])
+
+
+@pytest.mark.parametrize(("dim", "axes"), [(2, (0, 1)), (3, (0, 1)), (3, (0, 2)), (3, (0, 1, 2))])
+def test_a_checkerboard_is_seen_with_its_amplitude(precision, dim, axes):
+    """It alternates along two axes or three, on top of a linear field: A at one node, −A at the next.
+
+    On distorted cells too, edges and corners included: no cell's shape has a say in it.
+    """
+    plain, rng = box(dim), np.random.default_rng(3)
+    lattice = distorted(plain)
+    sign = (-1.0) ** index_of(plain)[:, axes].sum(axis=1)
+    amplitude, slope = rng.normal(size=size_of(dim)), rng.normal(size=(size_of(dim), dim))
+    seen = see(lattice, sign[:, None] * amplitude + lattice.nodes @ slope.T, precision)
+    close = {"rtol": 0.0, "atol": 10 * ROUNDING[precision]}
+    np.testing.assert_allclose(seen.checkerboard, sign[:, None] * amplitude, **close)
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_a_field_that_varies_along_one_axis_is_no_checkerboard(precision, dim):
+    """Not even where it alternates, as the stress does across a free edge, and all that a bar can have."""
+    rng = np.random.default_rng(4)
+    lattice = box(dim)
+    for axis in range(dim):
+        profile = rng.normal(size=(CELLS[axis] + 1, size_of(dim)))
+        seen = see(lattice, profile[index_of(lattice)[:, axis]], precision)
+        np.testing.assert_allclose(seen.checkerboard, 0.0, rtol=0.0, atol=10 * ROUNDING[precision])
+        np.testing.assert_allclose(seen.gradient, 0.0, rtol=0.0, atol=10 * ROUNDING[precision])
+
+
+def test_taking_the_checkerboard_off_keeps_the_sum():
+    """Σ m f on a lattice, m the number of a node's cells, for any field at all."""
+    lattice = box(3)
+    field = np.random.default_rng(5).normal(size=(len(lattice.nodes), size_of(3)))
+    cells = np.bincount(lattice.cells.ravel())
+    lost = cells @ see(lattice, field, "float64").checkerboard
+    np.testing.assert_allclose(lost, 0.0, atol=1e-12)
+
+
+def test_a_folded_cell_has_no_frame():
+    """A corner pushed through the opposite one: modes are finite, the gradient is that of the middle."""
+    lattice = Box((1.0, 1.0), 1.0).lattice()
+    nodes = lattice.nodes.copy()
+    nodes[3] = (-1.5, -1.5)
+    field, given = np.arange(24.0).reshape(4, 6), np.ones((1, 6, 2))
+    seen = see(lattice.with_nodes(nodes), field, "float64", given)
+    np.testing.assert_allclose(seen.gradient, 1.0)
+    np.testing.assert_allclose(seen.modes[0, :, 0], field.T @ [0.25, -0.25, -0.25, 0.25])
+
+
+# ---------------------------------------------------------------------------------------------------------
+# The pressure at fronts
+# ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def pressure_probe(dim, precision):
+    """A kernel that writes q of all cells."""
+    continuum, real = CONTINUA[dim], PRECISIONS[precision]
+    types, front = node_types(continuum, real), front_pressure(continuum, real)
+    describe, scalar = cell_types(continuum, real).describe, real.real
+    AuxiliaryNodes, MaterialNodes = types.AuxiliaryNodes, types.MaterialNodes
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def probe(
+        auxiliary: AuxiliaryNodes,
+        nodes: MaterialNodes,
+        rates: wp.array(dtype=scalar),
+        strength: scalar,
+        dt: scalar,
+        out: wp.array(dtype=scalar),
+    ):
+        a = wp.tid()
+        _mean, cell = describe(a, auxiliary, nodes.point)
+        out[a] = front(a, rates[a], cell.frame, auxiliary, nodes, strength, dt)
+
+    return probe, types, scalar
+
+
+def pressures(lattice, gradients, rates, precision, strength=0.75, dt=0.1, density=3.0):
+    """q of each cell for node values of L (n, d, d) and tr L in the middle of the cells (m,)."""
+    probe, types, scalar = pressure_probe(lattice.dim, precision)
+    points = np.zeros(len(lattice.nodes), dtype=types.Point.numpy_dtype())
+    points["x"] = lattice.nodes
+    auxiliary, nodes, m = types.AuxiliaryNodes(), types.MaterialNodes(), len(lattice.cells)
+    nodes.point = wp.array(points, dtype=types.Point, device="cpu")
+    nodes.velocity_gradient = wp.array(gradients, dtype=types.tensor, device="cpu")
+    auxiliary.cell = wp.array(lattice.cells, dtype=wp.int32, device="cpu")
+    auxiliary.density = wp.full(m, density, dtype=scalar, device="cpu")
+    out = wp.full(m, np.nan, dtype=scalar, device="cpu")
+    inputs = [auxiliary, nodes, wp.array(rates, dtype=scalar, device="cpu"), strength, dt]
+    wp.launch(probe, m, inputs, [out], device="cpu")
+    return out.numpy()
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_no_pressure_in_a_linear_field_of_rates_nor_in_shear_nor_at_rest(precision, dim):
+    """Of tr L, linear in the position, on distorted cells; of a jump in shear; of nothing at all."""
+    lattice, rng = distorted(box(dim)), np.random.default_rng(6)
+    n, m, slope = len(lattice.nodes), len(lattice.cells), rng.normal(size=dim)
+    gradients = np.eye(dim) * ((1.0 + lattice.nodes @ slope) / dim)[:, None, None]
+    rates = 1.0 + lattice.nodes[lattice.cells].mean(axis=1) @ slope
+    assert (
+        np.abs(pressures(lattice, gradients, rates, precision)).max() <= ROUNDING[precision] ** 2 / ROUGH**2 * 1e2
+    )
+    if dim > 1:
+        jump = np.zeros((n, dim, dim))
+        jump[: n // 2, 0, 1] = 5.0
+        assert not pressures(lattice, jump, np.zeros(m), precision).any()
+    assert not pressures(lattice, np.zeros((n, dim, dim)), np.zeros(m), precision).any()
+
+
+@pytest.mark.parametrize("rate", [-2.0, 2.0])
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_pressure_at_a_jump_is_rho_nu_e_with_the_least_thickness(precision, dim, rate):
+    """Cells of 1 × 0.5 × 2: Δ is the least of them. It resists, and grows with the square of a small roughness."""
+    stretch = np.array([1.0, 0.5, 2.0])[:dim]
+    plain = box(dim)
+    lattice = plain.with_nodes(plain.nodes * stretch)
+    still, rates = np.zeros((len(lattice.nodes), dim, dim)), np.full(len(lattice.cells), rate)
+    full = 3.0 * 0.75 * stretch.min() ** 2 / (4.0 * 0.1) * rate
+    np.testing.assert_allclose(pressures(lattice, still, rates, precision), full, rtol=ROUNDING[precision])
+    smooth = np.tile(0.9 * rate / dim * np.eye(dim), (len(lattice.nodes), 1, 1))
+    expected = full * (0.1 / ROUGH) ** 2
+    np.testing.assert_allclose(
+        pressures(lattice, smooth, rates, precision), expected, rtol=10 * ROUNDING[precision]
+    )
