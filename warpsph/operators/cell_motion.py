@@ -7,13 +7,12 @@ edge in strong shear by tens of per cent.
 
 from functools import cache
 
-import numpy as np
 import warp as wp
 
 from ..ground.linear_algebra import determinant_of
 from ..nodes.node_sets import node_types
 from ..scene.lattice import Lattice
-from .cells import cells_of_nodes
+from .cells import cells_of_nodes, corner_sides
 from .motion import Motion
 
 # A cell that folds keeps this share of its initial volume: a density must stay positive.
@@ -62,9 +61,7 @@ def _kernels(continuum, precision):
     real, vector, tensor = precision.real, types.vector, types.tensor
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
     determinant, corners = determinant_of(dim, precision), 2**dim
-    side = precision.mat(corners, dim)(
-        *[1.0 if k >> (dim - 1 - a) & 1 else -1.0 for k in range(corners) for a in range(dim)]
-    )
+    side = corner_sides(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(dt: real, nodes: MaterialNodes):

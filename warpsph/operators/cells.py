@@ -52,6 +52,35 @@ class CellTypes:
     gather: wp.Function
 
 
+def _ends(dim: int) -> np.ndarray:
+    """2ξ of each corner, shape (2ᵈ, d)."""
+    return np.array(list(itertools.product((-1.0, 1.0), repeat=dim)))
+
+
+def corner_sides(continuum: Continuum, precision: Precision):
+    """2ξ of each corner, as a Warp matrix."""
+    return precision.mat(2**continuum.dim, continuum.dim)(*_ends(continuum.dim).ravel().tolist())
+
+
+@cache
+def frame_function(continuum: Continuum, precision: Precision) -> wp.Function:
+    """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
+    dim, real = continuum.dim, precision.real
+    tensor, determinant, inverse = precision.mat(dim, dim), determinant_of(dim, precision), inverse_of(dim, precision)
+
+    @wp.func
+    def frame_of(edges: tensor):
+        columns_of = wp.transpose(edges)
+        box = real(1.0)
+        for a in range(wp.static(dim)):
+            box *= wp.length(columns_of[a])
+        if determinant(edges) <= real(FOLDED) * box:
+            return tensor()
+        return inverse(edges)
+
+    return frame_of
+
+
 @cache
 def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     """The types and functions of one continuum in one precision."""
@@ -59,15 +88,15 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     real, phi, tensor, phi_gradient = precision.real, types.phi, types.tensor, types.phi_gradient
     AuxiliaryNodes, Point = types.AuxiliaryNodes, types.Point
     corners = 2**dim
-    end = np.array(list(itertools.product((-1.0, 1.0), repeat=dim)))  # 2ξ of each corner
+    end = _ends(dim)
     subsets = [s for size in range(2, dim + 1) for s in itertools.combinations(range(dim), size)]
     number = len(subsets)
     columns = max(1, number)  # a bar has no such mode, and Warp no matrix without columns
     alternating = np.stack([end[:, s].prod(axis=1) for s in subsets] or [np.zeros(corners)], axis=1)
     phi_modes, position_modes = precision.mat(types.size, columns), precision.mat(dim, columns)
-    side = precision.mat(corners, dim)(*end.ravel().tolist())
+    side = corner_sides(continuum, precision)
     sign = precision.mat(corners, columns)(*alternating.ravel().tolist())
-    determinant, inverse = determinant_of(dim, precision), inverse_of(dim, precision)
+    determinant, frame_of = determinant_of(dim, precision), frame_function(continuum, precision)
 
     @wp.struct
     class Cell:
@@ -80,17 +109,6 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     class Cells:
         cell: wp.array(dtype=Cell)
         of_node: wp.array2d(dtype=wp.int32)
-
-    @wp.func
-    def frame_of(edges: tensor):
-        """∇ξ_a in row a, for the edges ∂x/∂ξ_a in column a; zero for a folded cell."""
-        columns_of = wp.transpose(edges)
-        box = real(1.0)
-        for a in range(wp.static(dim)):
-            box *= wp.length(columns_of[a])
-        if determinant(edges) <= real(FOLDED) * box:
-            return tensor()
-        return inverse(edges)
 
     @wp.func
     def squareness_of(frame: tensor, volume: real):

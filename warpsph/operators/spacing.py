@@ -1,8 +1,8 @@
 """How much closer than at the start the nodes are, as far as the time step can feel it.
 
-A corrected gradient multiplies neighbours' values by G_J = A⁻¹ g_J r_J, A = Σ g_J r_J r_J, g_J = V_J (−W′/ξ). By
-Cauchy and Schwarz Σ |e · G_J| ≤ √(Σ g/λ) along any direction e, λ the least eigenvalue of A, with equality on a
-lattice: waves are stable for c_p Δt ≤ 2 √(λ/Σ g). That is METHOD's 2 √m₂ Δx, wherever the nodes now are.
+Kernels are stretched and turned with the cells, so in a cell's own coordinates ξ every gradient is a lattice's, whose
+waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 3). In space that gradient grows with ∇ξ, at most by its largest
+singular value: Δx is the least singular value of the cell's edges ∂x/∂ξ, the least distance across it in any direction.
 """
 
 from functools import cache
@@ -10,39 +10,33 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from ..ground.linear_algebra import inverse_of
 from ..ground.precision import Precision
-from ..ground.smoothing import SMOOTHING_FUNCTIONS
-from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
-from ..scene.numerics import KERNELS
-from .sweep import EDGE
+from .cells import corner_sides, frame_function
 
-# Cells that fold have no spacing left; the step is not shortened beyond this share, or a run would never end.
+# A step is not shortened beyond this share, or a run in which cells fold would never end.
 SMALLEST = 0.25
-DOUBLINGS = 7  # A⁻ᵏ with k = 2⁷: tr(A⁻ᵏ⁻¹)/tr(A⁻ᵏ) misses its largest eigenvalue by at most (d − 1)/(e k), 0.6 %
+DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that differ by 3 %
 
 
 class Spacing:
-    """Measures the spacing of the auxiliary nodes' neighbourhoods.
+    """Measures the spacing of the cells.
 
     Args:
-        m: number of auxiliary nodes.
-        kernel: name of the smoothing function.
+        m: number of cells.
     """
 
-    def __init__(self, m: int, continuum: Continuum, precision: Precision, kernel: str, device: wp.Device):
-        self._kernel = _spacing_kernel(continuum, precision, kernel)
+    def __init__(self, m: int, continuum: Continuum, precision: Precision, device: wp.Device):
+        self._kernel = _spacing_kernel(continuum, precision)
         self._spacing = wp.zeros(m, dtype=precision.real, device=device)
         self._initial: float | None = None
         self.kernels = (self._kernel,)
 
-    def shrinkage(self, pairs: PairList, nodes, auxiliary) -> float:
+    def shrinkage(self, nodes, auxiliary) -> float:
         """The least spacing over the least one at the first call, between `SMALLEST` and 1."""
-        inputs = [pairs, nodes, auxiliary]
         device = self._spacing.device
-        wp.launch(self._kernel, self._spacing.shape[0], inputs, [self._spacing], device=device)
+        wp.launch(self._kernel, self._spacing.shape[0], [nodes, auxiliary], [self._spacing], device=device)
         smallest = float(np.min(self._spacing.numpy()))
         if self._initial is None:
             self._initial = smallest
@@ -50,39 +44,27 @@ class Spacing:
 
 
 @cache
-def _spacing_kernel(continuum: Continuum, precision: Precision, kernel: str):
-    types, dim, real = node_types(continuum, precision), continuum.dim, precision.real
-    tensor, inverse = types.tensor, inverse_of(dim, precision)
-    weights = SMOOTHING_FUNCTIONS[kernel](precision)
-    support_squared = EDGE * KERNELS[kernel].support ** 2
+def _spacing_kernel(continuum: Continuum, precision: Precision):
+    types, real, dim = node_types(continuum, precision), precision.real, continuum.dim
+    tensor, frame_of = types.tensor, frame_function(continuum, precision)
+    corners, side = 2**dim, corner_sides(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def spacing(
-        pairs: PairList,
-        nodes: types.MaterialNodes,
-        auxiliary: types.AuxiliaryNodes,
-        result: wp.array(dtype=real),
-    ):
+    def spacing(nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)):
         a = wp.tid()
-        x, h = auxiliary.point[a].x, auxiliary.smoothing_length[a]
-        total, moments = real(0.0), tensor()
-        for k in range(pairs.start[a], pairs.start[a + 1]):
-            neighbour = nodes.point[pairs.index[k]]
-            r = neighbour.x - x
-            s = wp.dot(r, r) / (h * h)
-            if s < real(support_squared):
-                _, g = weights(s)
-                g *= neighbour.volume
-                total += g
-                moments += g * wp.outer(r, r)
-        if wp.trace(moments) <= real(0.0):
-            result[a] = real(wp.inf)  # no neighbour is left that a step could be too long for
+        edges = tensor()
+        for k in range(wp.static(corners)):
+            edges += wp.outer(nodes.point[auxiliary.cell[a, k]].x, side[k])
+        edges = real(wp.static(2.0 / corners)) * edges
+        frame = frame_of(edges)
+        stiff = frame * wp.transpose(frame)
+        if wp.trace(stiff) <= real(0.0):
+            result[a] = real(wp.inf)  # a folded cell: its kernels are round
             return
-        stiff = inverse(moments)
         power = stiff / wp.trace(stiff)
         for _ in range(DOUBLINGS):
             power = power * power
             power = power / wp.trace(power)
-        result[a] = real(2.0) / wp.sqrt(wp.trace(stiff * power) * total)
+        result[a] = real(1.0) / wp.sqrt(wp.trace(stiff * power))
 
     return spacing

@@ -59,7 +59,7 @@ class Stepper:
             cells = numerics.velocity_scheme == "compatible"
             self._motion = CellMotion(lattice, numerics.smoothing_ratio, *moving) if cells else Motion(n, *moving)
             if cells:
-                self._spacing = Spacing(self._m, continuum, precision, numerics.kernel, device)
+                self._spacing = Spacing(self._m, continuum, precision, device)
         search = (support, lattice.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
         centre = centre_kernel(continuum, precision)
@@ -126,7 +126,7 @@ class Stepper:
         self._motion.mark(self.nodes, self.auxiliary)
         self.conditions.locate(self.nodes)
         if self._spacing:
-            self.shrinkage = self._spacing.shrinkage(self._around_auxiliary.pairs, self.nodes, self.auxiliary)
+            self.shrinkage = self._spacing.shrinkage(self.nodes, self.auxiliary)
         self.list_builds += 1
 
     def _initial_spin(self, scene: Scene) -> None:
