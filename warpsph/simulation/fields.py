@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.dimension import Continuum
+from ..scene.lattice import Lattice
 from ..scene.material import PerzynaVonMises
 
 
@@ -63,6 +64,33 @@ def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     return np.trace(_tensor(stress, continuum), axis1=1, axis2=2) / 3.0
 
 
+def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
+    """Green-Lagrange strain E = (H + Hᵀ + HᵀH)/2, H = ∂u/∂X, shape (n, s): the mean over a node's cells.
+
+    In the components and the order of the stored stresses; E33 of plane strain is zero.
+
+    Args:
+        lattice: the initial lattice.
+        displacement: of the nodes [m], shape (n, d).
+    """
+    H = lattice.cell_gradients(displacement)
+    E = 0.5 * (H + np.swapaxes(H, 1, 2) + np.swapaxes(H, 1, 2) @ H)
+    zero = np.zeros(len(E))  # out of plane
+    inside = [max(pair) < lattice.dim for pair in lattice.continuum.pairs]
+    parts = [E[:, i, j] if known else zero for (i, j), known in zip(lattice.continuum.pairs, inside, strict=True)]
+    return lattice.at_nodes(np.stack(parts, axis=1))
+
+
+def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
+    """Names of the components of a field: s12, e11, y, or xy of a tensor; none of a scalar."""
+    shape, axes = FIELDS[name].shape, continuum.axes
+    if shape == "(n, s)":
+        return tuple(("s" if name == "stress" else "e") + part[1:] for part in continuum.stress_components)
+    if shape == "(n, d)":
+        return axes
+    return tuple(a + b for a in axes for b in axes) if shape == "(n, d, d)" else ()
+
+
 def _tensor(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     full = np.zeros((len(stress), 3, 3))
     for k, (i, j) in enumerate(continuum.pairs):
@@ -82,6 +110,12 @@ FIELDS: dict[str, Field] = {
     "von_mises_stress": Field("Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.lattice.continuum)),
     "mean_stress": Field(
         "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.lattice.continuum)
+    ),
+    "strain": Field(
+        "-",
+        "(n, s)",
+        "Green-Lagrange strain, components as of the stress",
+        lambda s: green_strain(s.lattice, s.nodes.displacement.numpy()),
     ),
     "equivalent_plastic_strain": Field(
         "-", "(n,)", "equivalent viscoplastic strain ε̄", lambda s: s.history.numpy()[:, 0].copy(), _has_yield

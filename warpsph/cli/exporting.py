@@ -1,0 +1,141 @@
+"""What `warpsph run` keeps of a run, and the command `warpsph export`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from ..errors import SceneError, one_of
+from ..export.frames import Frames, FrameWriter, clear, evenly
+from ..scene.validate import index, number
+from ..simulation.simulation import Simulation
+
+FRAMES = 50
+USD = (".usdc", ".usda")
+# Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
+WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
+
+
+def add_recording(running: argparse.ArgumentParser) -> None:
+    """Add the options of `warpsph run` that keep frames and write USD."""
+    running.add_argument(
+        "--frames", default=str(FRAMES), metavar="N", help=f"frames to keep for plot and export (default: {FRAMES})"
+    )
+    running.add_argument("--usd", metavar="FILE", help="USD stage to write as the run goes on (.usdc or .usda)")
+
+
+def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Callable[[Simulation], Recorder]]:
+    """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
+    try:
+        count = index("--frames", int(options.frames))
+    except ValueError:
+        raise SceneError("--frames", options.frames, "it must be a whole number, at least 0") from None
+    if options.usd and not count:
+        raise SceneError("--frames", count, "with --usd it must be at least 1")
+    path = _target("--usd", options.usd, USD) if options.usd else None
+    if not count:
+        clear(folder)  # those of a former run would be taken for this one's
+        return []
+    followers = []
+    if path:
+        from ..export.usd_live import LiveStage  # USD is slow to import
+
+        followers.append(lambda frames: LiveStage(frames, path))
+    return [lambda simulation: Recorder(FrameWriter(simulation, evenly(end, count), folder, followers))]
+
+
+class Recorder:
+    """Keeps frames as long as that works: a full disk must not cost the run its result."""
+
+    def __init__(self, writer: FrameWriter):
+        self._writer, self._works = writer, True
+
+    def observe(self, simulation: Simulation) -> None:
+        """Pass on."""
+        if self._works:
+            self._attempt(lambda: self._writer.observe(simulation))
+
+    def close(self) -> None:
+        """Close what still works."""
+        if self._works:
+            self._attempt(self._writer.close)
+
+    def _attempt(self, task: Callable[[], None]) -> None:
+        try:
+            task()
+        except (OSError, RuntimeError) as error:  # USD raises the latter
+            self._works = False
+            text = " ".join(str(error).split())
+            print(f"warpsph: from here on no frames are kept, the run goes on ({text})", file=sys.stderr)
+
+
+def add_export(commands) -> None:
+    """Add the command `warpsph export`."""
+    exporting = commands.add_parser(
+        "export",
+        help="write the frames of a run as USD or for ParaView",
+        description="Writes the frames of a run as one USD stage (.usdc, .usda) or as VTK point data (.pvd).",
+    )
+    exporting.add_argument("dir", metavar="DIR", help="folder of a run")
+    exporting.add_argument("file", metavar="FILE", help=f"what to write: {', '.join(WRITERS)}")
+    exporting.add_argument("--field", metavar="NAME", help="USD: field to colour by, e.g. velocity:y (default: the scene's)")
+    exporting.add_argument("--colour-map", metavar="MAP", help="USD: a matplotlib colour map (default: cividis)")
+    exporting.add_argument(
+        "--range", nargs=2, metavar=("LOW", "HIGH"), help="USD: values at the ends of the map (default: of all frames)"
+    )
+    exporting.set_defaults(command=_export)
+
+
+def _export(options: argparse.Namespace) -> int:
+    frames = kept_frames(options.dir)
+    path = _target("FILE", options.file, tuple(WRITERS))
+    writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
+    try:
+        if path.suffix in USD:
+            writer.write_stage(frames, path, _colouring(options, frames))
+        else:
+            writer.write_series(frames, path)
+    except OSError as error:
+        raise SceneError("FILE", options.file, f"it must be a file that can be written ({error})") from None
+    print(f"{path}: {len(frames)} frames, {len(frames.lattice.nodes)} nodes")
+    return 0
+
+
+def _colouring(options: argparse.Namespace, frames: Frames):
+    from ..export.colours import Colouring, named_map, whole_span
+    from ..export.quantity import quantity
+
+    shown, colour_map = quantity(options.field, frames), named_map(options.colour_map)
+    if options.range is None:
+        return Colouring(shown, whole_span(shown, frames), colour_map)
+    try:
+        low, high = (number("--range", float(text)) for text in options.range)
+    except ValueError:
+        raise SceneError("--range", " ".join(options.range), "it must be two numbers") from None
+    return Colouring(shown, (low, number("--range", high, above=low)), colour_map)
+
+
+def kept_frames(text: str) -> Frames:
+    """The frames of a run's folder, at least one."""
+    frames = Frames(Path(text))
+    if not len(frames):
+        raise SceneError("DIR", text, "it must be the folder of a run that kept frames (`--frames N`)")
+    return frames
+
+
+def _target(option: str, text: str, suffixes: tuple[str, ...]) -> Path:
+    """The path of a file to be written, in a folder that is made if need be."""
+    path = Path(text)
+    if path.suffix not in suffixes:
+        raise SceneError(option, text, one_of([f"NAME{suffix}" for suffix in suffixes]))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.with_name(f".{path.name}.warpsph")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SceneError(option, text, f"it must be a file that can be written ({error})") from None
+    return path
