@@ -7,12 +7,14 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import TypeVar
 
 from ..errors import SceneError, one_of
 from ..export.frames import Frames, FrameWriter, clear, evenly
 from ..scene.validate import index, number
 from ..simulation.simulation import Simulation
 
+Made = TypeVar("Made")
 FRAMES = 50
 USD = (".usdc", ".usda")
 # Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
@@ -22,7 +24,10 @@ WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
 def add_recording(running: argparse.ArgumentParser) -> None:
     """Add the options of `warpsph run` that keep frames and write USD."""
     running.add_argument(
-        "--frames", default=str(FRAMES), metavar="N", help=f"frames to keep for plot and export (default: {FRAMES})"
+        "--frames",
+        default=str(FRAMES),
+        metavar="N",
+        help=f"frames to keep for plot and export (default: {FRAMES})",
     )
     running.add_argument("--usd", metavar="FILE", help="USD stage to write as the run goes on (.usdc or .usda)")
 
@@ -44,14 +49,16 @@ def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Cal
         from ..export.usd_live import LiveStage  # USD is slow to import
 
         followers.append(lambda frames: LiveStage(frames, path))
-    return [lambda simulation: Recorder(FrameWriter(simulation, evenly(end, count), folder, followers))]
+    times = evenly(end, count)
+    return [lambda simulation: Recorder(lambda: FrameWriter(simulation, times, folder, followers))]
 
 
 class Recorder:
     """Keeps frames as long as that works: a full disk must not cost the run its result."""
 
-    def __init__(self, writer: FrameWriter):
-        self._writer, self._works = writer, True
+    def __init__(self, make: Callable[[], FrameWriter]):
+        self._works = True
+        self._writer = self._attempt(make)
 
     def observe(self, simulation: Simulation) -> None:
         """Pass on."""
@@ -63,13 +70,14 @@ class Recorder:
         if self._works:
             self._attempt(self._writer.close)
 
-    def _attempt(self, task: Callable[[], None]) -> None:
+    def _attempt(self, task: Callable[[], Made]) -> Made | None:
         try:
-            task()
+            return task()
         except (OSError, RuntimeError) as error:  # USD raises the latter
             self._works = False
             text = " ".join(str(error).split())
             print(f"warpsph: from here on no frames are kept, the run goes on ({text})", file=sys.stderr)
+            return None
 
 
 def add_export(commands) -> None:
@@ -81,10 +89,14 @@ def add_export(commands) -> None:
     )
     exporting.add_argument("dir", metavar="DIR", help="folder of a run")
     exporting.add_argument("file", metavar="FILE", help=f"what to write: {', '.join(WRITERS)}")
-    exporting.add_argument("--field", metavar="NAME", help="USD: field to colour by, e.g. velocity:y (default: the scene's)")
+    exporting.add_argument(
+        "--field", metavar="NAME", help="USD: field to colour by, e.g. velocity:y (default: the scene's)"
+    )
     exporting.add_argument("--colour-map", metavar="MAP", help="USD: a matplotlib colour map (default: cividis)")
     exporting.add_argument(
-        "--range", nargs=2, metavar=("LOW", "HIGH"), help="USD: values at the ends of the map (default: of all frames)"
+        "--range",
+        metavar="LOW,HIGH",
+        help="USD: values at the ends of the map, e.g. --range=-1e5,0 (default: of all frames)",
     )
     exporting.set_defaults(command=_export)
 
@@ -112,10 +124,11 @@ def _colouring(options: argparse.Namespace, frames: Frames):
     if options.range is None:
         return Colouring(shown, whole_span(shown, frames), colour_map)
     try:
-        low, high = (number("--range", float(text)) for text in options.range)
+        low, high = (number("--range", float(text)) for text in options.range.split(","))
+        number("--range", high, above=low)
     except ValueError:
-        raise SceneError("--range", " ".join(options.range), "it must be two numbers") from None
-    return Colouring(shown, (low, number("--range", high, above=low)), colour_map)
+        raise SceneError("--range", options.range, "it must be LOW,HIGH: two numbers, the second larger") from None
+    return Colouring(shown, (low, high), colour_map)
 
 
 def kept_frames(text: str) -> Frames:

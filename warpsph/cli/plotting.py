@@ -20,7 +20,9 @@ def add_plot(commands) -> None:
         description="Draws the whole run on one sheet (DIR/overview.png), or one time, or an animation.",
     )
     plotting.add_argument("dir", metavar="DIR", help="folder of a run")
-    plotting.add_argument("--field", metavar="NAME", help="what to draw, e.g. velocity:y (default: the scene's field)")
+    plotting.add_argument(
+        "--field", metavar="NAME", help="what to draw, e.g. velocity:y (default: the scene's field)"
+    )
     plotting.add_argument("--time", metavar="T", help="draw the frame nearest to this time [s]")
     plotting.add_argument("--animate", nargs="?", const="gif", metavar="|".join(MOVIES), help="draw all frames")
     plotting.set_defaults(command=_plot)

@@ -92,7 +92,10 @@ class FrameWriter:
         times, rate = [float(time) for time in times], _rate(times)
         if former:
             kept = [time for time in former["times"] if time <= simulation.time * (1.0 + ROUNDING)]
-            times, rate = kept + [time for time in times if time > simulation.time * (1.0 + ROUNDING)], former["rate"]
+            times, rate = (
+                kept + [time for time in times if time > simulation.time * (1.0 + ROUNDING)],
+                former["rate"],
+            )
         self._times = np.array(times)
         self._fields = [name for name in STORED if name in simulation.fields()]
         if simulation.scene.output.field not in (*self._fields, *DERIVED):
@@ -208,7 +211,8 @@ class Frames(Sequence):
     def walls(self) -> tuple[Wall, ...]:
         """What surrounds the body."""
         return tuple(
-            Wall(wall["name"], self._body[f"wall_{k}"], wall["still"]) for k, wall in enumerate(self.about["walls"])
+            Wall(wall["name"], self._body[f"wall_{k}"], wall["still"])
+            for k, wall in enumerate(self.about["walls"])
         )
 
     @property

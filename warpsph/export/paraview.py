@@ -80,7 +80,10 @@ def _cells(corners: np.ndarray):
     cells, (count, size) = model.vtkCellArray(), corners.shape
     offsets = np.arange(count + 1, dtype=np.int64) * size
     connectivity = np.ascontiguousarray(corners, dtype=np.int64).ravel()
-    cells.SetData(support.numpy_to_vtkIdTypeArray(offsets, deep=True), support.numpy_to_vtkIdTypeArray(connectivity, deep=True))
+    cells.SetData(
+        support.numpy_to_vtkIdTypeArray(offsets, deep=True),
+        support.numpy_to_vtkIdTypeArray(connectivity, deep=True),
+    )
     return cells
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 from matplotlib import animation
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,6 +18,7 @@ from .frames import Frame, Frames
 from .quantity import Quantity
 from .view import View
 
+WIDTH, BELOW = 12.0, 3.2  # of the sheet, and height of its lower part [inch]
 SNAPSHOTS = 6
 HISTORIES = 3
 FRAMES_A_SECOND = 12
@@ -54,47 +56,50 @@ def animate(frames: Frames, quantity: Quantity, path: Path) -> None:
 def plot_overview(frames: Frames, quantity: Quantity, path: Path) -> None:
     """The whole run on one sheet: the quantity at several times, the deformation, the histories."""
     view, chosen = View.of(frames, quantity), _evenly_chosen(frames)
-    dim, histories = frames.lattice.dim, _histories(frames)
-    rows, columns = _table(view.width_to_height, len(chosen)) if dim > 1 else (1, 2)
-    width = 12.0 if columns > 1 else 7.0
-    upper = float(np.clip(rows * (0.86 * width / columns / view.width_to_height + 0.55), 3.0, 11.0)) + 0.3
-    figure = _new_figure((width, upper + 3.4))
-    above, below = figure.subfigures(2, 1, height_ratios=(upper, 3.4))
-    if dim == 1:
+    histories = _histories(frames)
+    rows, columns = _table(view.width_to_height, len(chosen)) if len(view.low) > 1 else (1, 1)
+    height = float(np.clip(rows * (0.85 * WIDTH / columns / view.width_to_height + 0.3) + 0.5, 3.5, 11.0))
+    figure = _new_figure((WIDTH, height + BELOW))
+    figure.suptitle(frames.about["scene"])
+    above, below = figure.subfigures(2, 1, height_ratios=(height, BELOW))
+    if len(view.low) == 1:
         _lines_and_diagram(view, frames, chosen, above)
+        widths = [1.0] * len(histories)
     else:
-        panels = [view.axes(above, rows, columns, k + 1) for k in range(len(chosen))]
-        for k, (axes, frame) in enumerate(zip(panels, chosen, strict=True)):
-            view.draw(axes, frame)
-            axes.set_title(f"t = {frame.time:.4g} s", fontsize=10)
-            if dim == 2:
-                axes.set_xlabel("x [m]" if k + columns >= len(chosen) else "")
-                axes.set_ylabel("y [m]" if k % columns == 0 else "")
-        view.colour_bar(above, panels, shrink=0.8, aspect=35)
-    figure.suptitle(_title(frames))
-    places = len(histories) + (dim > 1)
-    if dim > 1:
-        axes = view.axes(below, 1, places, 1)
-        view.draw_grid(axes, chosen[-1])
-    for k, (x, y, reference) in enumerate(histories):
-        axes = below.add_subplot(1, places, k + 1 + (dim > 1))
-        _draw_history(axes, x, y, reference)
+        _snapshots(view, chosen, above, rows, columns)
+        widths = [float(np.clip(view.width_to_height, 0.6, 1.8)), *[1.0] * len(histories)]
+    cells = below.add_gridspec(1, len(widths), width_ratios=widths) if widths else []
+    if len(view.low) > 1:
+        view.draw_grid(view.axes(below, cells[0]), chosen[-1])
+    for k, (x, y, reference) in enumerate(reversed(histories)):
+        _draw_history(below.add_subplot(cells[-1 - k]), x, y, reference)
     _save(figure, path)
+
+
+def _snapshots(view: View, chosen: Sequence[Frame], figure, rows: int, columns: int) -> None:
+    panels = [view.axes(figure, rows, columns, k + 1) for k in range(len(chosen))]
+    for k, (axes, frame) in enumerate(zip(panels, chosen, strict=True)):
+        view.draw(axes, frame)
+        axes.set_title(f"t = {frame.time:.4g} s", fontsize=10)
+        if len(view.low) == 2:
+            lowest, leftmost = k + columns >= len(chosen), k % columns == 0
+            axes.set(xlabel="x [m]" if lowest else "", ylabel="y [m]" if leftmost else "")
+            axes.tick_params(labelbottom=lowest, labelleft=leftmost)
+    view.colour_bar(figure, panels, shrink=0.8, aspect=35)
 
 
 def _lines_and_diagram(view: View, frames: Frames, chosen: Sequence[Frame], figure) -> None:
     """A bar: the quantity along it at some times, and over place and time."""
-    import matplotlib
-
     lines, diagram = figure.subplots(1, 2)
     shades = matplotlib.colormaps[COLOUR_MAP](np.linspace(0.0, 0.9, len(chosen)))
     for frame, shade in zip(chosen, shades, strict=True):
         view.draw(lines, frame, color=shade, label=f"{frame.time:.3g} s")
-    lines.legend(frameon=False, fontsize=8, ncols=2)
+    lines.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     time = [frame.time for frame in frames]
     values = np.array([view.quantity(frame) for frame in frames])
     x = frames.lattice.nodes[:, 0]
-    drawn = diagram.pcolormesh(x, time, values, cmap=COLOUR_MAP, shading="gouraud", vmin=view.span[0], vmax=view.span[1])
+    low, high = view.span
+    drawn = diagram.pcolormesh(x, time, values, cmap=COLOUR_MAP, shading="nearest", vmin=low, vmax=high)
     diagram.set(xlabel="initial x [m]", ylabel="time [s]")
     figure.colorbar(drawn, ax=diagram, label=view.quantity.label)
 
@@ -112,7 +117,7 @@ def _histories(frames: Frames) -> list[tuple]:
 
     first = frames.about["curve"] or (("time", probes[0]) if probes else None)
     pairs = [tuple(first)] if first else []
-    pairs += [("time", name) for name in probes if ("time", name) not in pairs]
+    pairs += [("time", name) for name in probes if not first or name not in first]
     references = [frames.about["curve_reference"], *[None] * len(pairs)]
     return [(column(x), column(y), r) for (x, y), r in zip(pairs, references, strict=False)][:HISTORIES]
 
@@ -120,7 +125,9 @@ def _histories(frames: Frames) -> list[tuple]:
 def _draw_history(axes, x: tuple, y: tuple, reference: Mapping | None) -> None:
     axes.plot(x[1], y[1], color=DARK, linewidth=1.3)
     if reference:
-        axes.axhline(reference[1], color=BRIGHT, linestyle="--", linewidth=1.1, label=f"{reference[0]}: {reference[1]:.4g}")
+        axes.axhline(
+            reference[1], color=BRIGHT, linestyle="--", linewidth=1.1, label=f"{reference[0]}: {reference[1]:.4g}"
+        )
         axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel=x[0], ylabel=y[0])
     axes.grid(alpha=0.3)
@@ -152,9 +159,8 @@ def _single(view: View):
     return figure, axes
 
 
-def _title(frames: Frames, frame: Frame | None = None) -> str:
-    scene = frames.about["scene"]
-    return scene if frame is None else f"{scene}, t = {frame.time:.4g} s"
+def _title(frames: Frames, frame: Frame) -> str:
+    return f"{frames.about['scene']}, t = {frame.time:.4g} s"
 
 
 def _new_figure(size: tuple[float, float]) -> Figure:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 
 from .. import __version__
 from ..simulation.fields import component_names
@@ -75,7 +75,10 @@ class Drawing:
             self._nodes.declare(name, component_names(name, frames.lattice.continuum))
         UsdGeom.Scope.Define(stage, WALLS)
         self._walls = [
-            (WallMesh.of(frames.lattice, wall), UsdGeom.Mesh.Define(stage, f"{WALLS}/{Tf.MakeValidIdentifier(wall.name)}"))
+            (
+                WallMesh.of(frames.lattice, wall),
+                UsdGeom.Mesh.Define(stage, f"{WALLS}/{wall.name}"),
+            )
             for wall in frames.walls
         ]
 
@@ -189,4 +192,6 @@ def _in_space(vectors: np.ndarray) -> np.ndarray:
 
 def _extent(points: np.ndarray, radius: float) -> Vt.Vec3fArray:
     columns = np.ascontiguousarray(points.T)
-    return Vt.Vec3fArray.FromNumpy(np.stack([columns.min(axis=1) - radius, columns.max(axis=1) + radius]).astype(np.float32))
+    return Vt.Vec3fArray.FromNumpy(
+        np.stack([columns.min(axis=1) - radius, columns.max(axis=1) + radius]).astype(np.float32)
+    )

@@ -76,7 +76,11 @@ class View:
         else:
             colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.lattice, values)))
             _solid(axes, frame.lattice, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
-            axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]), zlim=(self.low[2], self.high[2]))
+            axes.set(
+                xlim=(self.low[0], self.high[0]),
+                ylim=(self.low[1], self.high[1]),
+                zlim=(self.low[2], self.high[2]),
+            )
             axes.set_box_aspect(self.high - self.low)
 
     def draw_grid(self, axes: Axes, frame: Frame) -> None:
@@ -92,17 +96,22 @@ class View:
             around = position[lattice.cells[:, [0, 1, 3, 2, 0]]]
             cut = np.full((len(around), 1, 2), np.nan)
             axes.plot(*np.concatenate([around, cut], axis=1).reshape(-1, 2).T, color=DARK, linewidth=0.4)
-            edges = np.concatenate([lattice.nodes[lattice.faces], np.full((len(lattice.faces), 1, 2), np.nan)], axis=1)
+            edges = np.concatenate(
+                [lattice.nodes[lattice.faces], np.full((len(lattice.faces), 1, 2), np.nan)], axis=1
+            )
             axes.plot(*edges.reshape(-1, 2).T, color=GRID, linewidth=1.0, linestyle="--")
             axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        axes.set_title(f"deformation, t = {frame.time:.4g} s" + (f" (× {scale:g})" if scale != 1.0 else ""), fontsize=10)
+        axes.set_title(
+            f"deformation, t = {frame.time:.4g} s" + (f" (× {scale:g})" if scale != 1.0 else ""), fontsize=10
+        )
 
     def colour_bar(self, figure: Figure, axes, **place) -> None:
         """The bar that explains the colours; a bar's values stand on an axis already."""
         if len(self.low) > 1:
             scale = ScalarMappable(Normalize(*self.span), COLOUR_MAP)
             extend = beyond(np.array(self.values), self.span)
-            figure.colorbar(scale, ax=axes, label=self.quantity.label, extend=extend, **place)
+            pad = 0.08 if len(self.low) == 3 else 0.02  # room for the labels of the z axis
+            figure.colorbar(scale, ax=axes, label=self.quantity.label, extend=extend, **{"pad": pad} | place)
 
 
 def magnification(displacement: float, size: float) -> float:

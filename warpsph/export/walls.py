@@ -33,7 +33,9 @@ def walls_of(scene: Scene) -> tuple[Wall, ...]:
     """One wall for every condition that holds or moves at least one whole boundary face."""
     lattice, walls = scene.lattice, []
     for condition in scene.conditions:
-        faces = np.flatnonzero(condition.on.faces(lattice) & condition.on.nodes(lattice)[lattice.faces].all(axis=1))
+        faces = np.flatnonzero(
+            condition.on.faces(lattice) & condition.on.nodes(lattice)[lattice.faces].all(axis=1)
+        )
         if len(faces) and not isinstance(condition, Free):
             name = _unused(_name(condition, lattice, faces), [wall.name for wall in walls])
             walls.append(Wall(name, faces, isinstance(condition, Fixed)))
@@ -103,7 +105,9 @@ def _boxes(corner: np.ndarray) -> np.ndarray:
     count = corner.max() + 1
     a, b = corner.T
     sides = [(k, (k + 1) % 4) for k in range(4)]
-    return np.concatenate([np.stack([a + i * count, a + j * count, b + j * count, b + i * count], 1) for i, j in sides])
+    return np.concatenate(
+        [np.stack([a + i * count, a + j * count, b + j * count, b + i * count], 1) for i, j in sides]
+    )
 
 
 def _quads(corner: np.ndarray) -> np.ndarray:

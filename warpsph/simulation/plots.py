@@ -173,4 +173,3 @@ def _figure(size):
 
 def axis_label(name: str, unit: str) -> str:
     return f"{name.replace('_', ' ')} [{unit}]"
-
