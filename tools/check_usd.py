@@ -35,7 +35,7 @@ def faults(path: Path, run: Path | None = None) -> list[str]:
             found.append(f"{prim.GetPath()}: {len(own)} time codes, others have {len(codes)}")
         for code in own or [Usd.TimeCode.Default()]:
             found += [f"{prim.GetPath()} at {code}: {fault}" for fault in _shape(prim, code)]
-    return [*found, *(_against(stage, codes, run) if run else ())]
+    return [*found, *(_against(stage, codes, run) if run and stage.GetDefaultPrim() else ())]
 
 
 def _validated(stage: Usd.Stage) -> Iterator[str]:

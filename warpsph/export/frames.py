@@ -100,7 +100,7 @@ class FrameWriter:
         self._fields = [name for name in STORED if name in simulation.fields()]
         if simulation.scene.output.field not in (*self._fields, *DERIVED):
             self._fields.append(simulation.scene.output.field)
-        self._folder.mkdir(exist_ok=True)
+        self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(simulation, rate)
         self._due, self._followers = -1.0, ()
         self.observe(simulation)

@@ -1,8 +1,8 @@
 """A USD stage that grows with the run and can be opened at any time, also after the run was killed.
 
-Time samples can not be appended to a USD file safely. So while the run goes on the file is small, refers to one file a
-frame in a folder beside it (USD's value clips), and is replaced whole after every frame; when the run ends one
-flattened stage takes its place and the folder goes. What a frame costs does not grow with the frames before it.
+Time samples can not be appended to a USD file safely. So while the run goes on the file is small, refers to one
+file a frame in a folder beside it (USD's value clips), and is replaced whole after every frame; when the run ends
+one flattened stage takes its place and the folder goes. A frame costs the same however many were before it.
 """
 
 from __future__ import annotations
