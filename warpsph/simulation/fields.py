@@ -56,12 +56,16 @@ def _yield_size(simulation) -> np.ndarray:
 
 def von_mises(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     """q = √(3 J₂) [Pa] of stored stresses (n, s); |σ| in a bar."""
-    return np.sqrt(1.5 * np.sum(_deviator(stress, continuum) ** 2, axis=(1, 2)))
+    mean, squares = mean_stress(stress, continuum), 0.0
+    for k, (i, j) in enumerate(continuum.pairs):
+        squares = squares + ((stress[:, k] - mean) ** 2 if i == j else 2.0 * stress[:, k] ** 2)
+    stressless = 3 - sum(i == j for i, j in continuum.pairs)  # directions, of a bar
+    return np.sqrt(1.5 * (squares + stressless * mean**2))
 
 
 def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     """tr σ/3 [Pa], tension positive; σ/3 in a bar."""
-    return np.trace(_tensor(stress, continuum), axis1=1, axis2=2) / 3.0
+    return sum(stress[:, k] for k, (i, j) in enumerate(continuum.pairs) if i == j) / 3.0
 
 
 def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
@@ -74,11 +78,13 @@ def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
         displacement: of the nodes [m], shape (n, d).
     """
     H = lattice.cell_gradients(displacement)
-    E = 0.5 * (H + np.swapaxes(H, 1, 2) + np.swapaxes(H, 1, 2) @ H)
-    zero = np.zeros(len(E))  # out of plane
-    inside = [max(pair) < lattice.dim for pair in lattice.continuum.pairs]
-    parts = [E[:, i, j] if known else zero for (i, j), known in zip(lattice.continuum.pairs, inside, strict=True)]
-    return lattice.at_nodes(np.stack(parts, axis=1))
+
+    def part(i: int, j: int) -> np.ndarray:
+        if max(i, j) >= lattice.dim:
+            return np.zeros(len(H))
+        return 0.5 * (H[:, i, j] + H[:, j, i] + sum(H[:, k, i] * H[:, k, j] for k in range(lattice.dim)))
+
+    return lattice.at_nodes(np.stack([part(i, j) for i, j in lattice.continuum.pairs], axis=1))
 
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
@@ -89,17 +95,6 @@ def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
     if shape == "(n, d)":
         return axes
     return tuple(a + b for a in axes for b in axes) if shape == "(n, d, d)" else ()
-
-
-def _tensor(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    full = np.zeros((len(stress), 3, 3))
-    for k, (i, j) in enumerate(continuum.pairs):
-        full[:, i, j] = full[:, j, i] = stress[:, k]
-    return full
-
-
-def _deviator(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    return _tensor(stress, continuum) - mean_stress(stress, continuum)[:, None, None] * np.eye(3)
 
 
 FIELDS: dict[str, Field] = {
