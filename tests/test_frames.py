@@ -59,8 +59,8 @@ class Taken:
         self.steps.append((simulation.time, {name: simulation.field(name) for name in self.names}))
 
 
-def test_frames_are_the_first_steps_at_or_after_their_times(tmp_path):
-    simulation = Simulation(block(), device="cpu")
+def test_frames_are_the_first_steps_at_or_after_their_times(tmp_path, precision):
+    simulation = Simulation(block(), device="cpu", precision=precision)
     times = (0.0, 1e-3, 2.2e-3, 4e-3)
     names = (
         "position",
@@ -158,7 +158,11 @@ def test_a_full_disk_costs_the_frames_and_not_the_run(tmp_path, monkeypatch, cap
     monkeypatch.setattr(frames_module.np, "savez", full)
     assert main(["run", "perzyna_bar", "--quiet", "--device", "cpu", "--out", str(tmp_path)]) == 0
     error = capsys.readouterr().err
-    assert error.count("\n") == 1 and "no frames are kept, the run goes on" in error and "No space left" in error
+    assert (
+        error.count("\n") == 1
+        and "no further frames are kept, the run goes on" in error
+        and "No space left" in error
+    )
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["checks"][0]["passed"]
     assert Frames(tmp_path).numbers == [0, 1]
 

@@ -16,6 +16,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdValidation, Vt
 
 from warpsph.cli.main import main
 from warpsph.export.frames import Frames
+from warpsph.export.usd_live import LiveStage
 
 TOOL = Path(__file__).parent.parent / "tools" / "check_usd.py"
 SPACING, FRAMES = 0.1, 8
@@ -238,6 +239,25 @@ def test_a_killed_run_leaves_a_stage_that_opens_with_all_its_frames(tmp_path):
     assert faults(tmp_path / "flat.usdc", out) == []
 
 
+def test_a_stage_that_can_not_be_written_costs_neither_the_frames_nor_the_run(tmp_path, monkeypatch, capsys):
+    refer = LiveStage._refer
+
+    def full(stage):
+        if len(stage._seen) > 3:
+            raise OSError(28, "No space left on device")
+        refer(stage)
+
+    monkeypatch.setattr(LiveStage, "_refer", full)
+    path = tmp_path / "live.usdc"
+    arguments = ["run", "perzyna_bar", "--quiet", "--device", "cpu", "--out", str(tmp_path), "--usd", str(path)]
+    assert main(arguments) == 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "live.usdc is not written further, the run goes on" in error
+    assert Frames(tmp_path).numbers == list(range(51))
+    stage = Usd.Stage.Open(str(path))
+    assert material(stage).GetPointsAttr().GetTimeSamples() == [0.0, 1.0, 2.0]
+
+
 def _shift_time(stage):
     stage.GetPrimAtPath("/Run").GetAttribute("warpsph:time").Set(1.0, 3)
 
@@ -303,6 +323,7 @@ def test_the_tool_exits_with_1_for_a_file_that_is_no_stage(plane, tmp_path):
         (["export", "RUN", "a.usdc", "--range", "1"], "--range = '1' .* two numbers"),
         (["export", "RUN", "a.usdc", "--field", "speed"], "--field = 'speed' .* one of position"),
         (["export", "RUN", "RUN/frames/body.npz/a.usdc"], "FILE = .* a file that can be written"),
+        (["export", "RUN", "a.pvd", "--field", "stress:s11"], "--field = 'stress:s11' .* it is for USD"),
         (["run", "elastic_bar", "--usd", "a.usd"], "--usd = 'a.usd' .* NAME.usdc"),
         (["run", "elastic_bar", "--usd", "a.usdc", "--frames", "0"], "--frames = 0 .* with --usd .* at least 1"),
         (["run", "elastic_bar", "--frames", "-1"], "--frames = '-1' .* whole number, at least 0"),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..errors import SceneError, one_of
-from ..export.frames import Frames, FrameWriter, clear, evenly
+from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
 from ..scene.validate import index, number
 from ..simulation.simulation import Simulation
 
@@ -32,7 +32,7 @@ def add_recording(running: argparse.ArgumentParser) -> None:
     running.add_argument("--usd", metavar="FILE", help="USD stage to write as the run goes on (.usdc or .usda)")
 
 
-def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Callable[[Simulation], Recorder]]:
+def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Callable[[Simulation], Lenient]]:
     """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
     try:
         count = index("--frames", int(options.frames))
@@ -44,39 +44,48 @@ def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Cal
     if not count:
         clear(folder)  # those of a former run would be taken for this one's
         return []
-    followers = []
+    followers, times = [], evenly(end, count)
     if path:
         from ..export.usd_live import LiveStage  # USD is slow to import
 
-        followers.append(lambda frames: LiveStage(frames, path))
-    times = evenly(end, count)
-    return [lambda simulation: Recorder(lambda: FrameWriter(simulation, times, folder, followers))]
+        followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))
+
+    def recorder(simulation: Simulation) -> Lenient:
+        return Lenient(lambda: FrameWriter(simulation, times, folder, followers), "no further frames are kept")
+
+    return [recorder]
 
 
-class Recorder:
-    """Keeps frames as long as that works: a full disk must not cost the run its result."""
+class Lenient:
+    """An observer, or a follower of frames, that may fail to write: a full disk must not cost the run its result.
 
-    def __init__(self, make: Callable[[], FrameWriter]):
-        self._works = True
-        self._writer = self._attempt(make)
+    Args:
+        make: makes what it passes on to.
+        lost: what is lost when that fails, for the message.
+    """
+
+    def __init__(self, make: Callable[[], FrameWriter | Follower], lost: str):
+        self._lost, self._works = lost, True
+        self._inner = self._attempt(make)
 
     def observe(self, simulation: Simulation) -> None:
         """Pass on."""
-        if self._works:
-            self._attempt(lambda: self._writer.observe(simulation))
+        self._attempt(lambda: self._inner.observe(simulation))
+
+    def update(self) -> None:
+        """Pass on."""
+        self._attempt(lambda: self._inner.update())
 
     def close(self) -> None:
-        """Close what still works."""
-        if self._works:
-            self._attempt(self._writer.close)
+        """Pass on."""
+        self._attempt(lambda: self._inner.close())
 
     def _attempt(self, task: Callable[[], Made]) -> Made | None:
         try:
-            return task()
+            return task() if self._works else None
         except (OSError, RuntimeError) as error:  # USD raises the latter
             self._works = False
-            text = " ".join(str(error).split())
-            print(f"warpsph: from here on no frames are kept, the run goes on ({text})", file=sys.stderr)
+            print(f"warpsph: {self._lost}, the run goes on ({' '.join(str(error).split())})", file=sys.stderr)
             return None
 
 
@@ -109,11 +118,21 @@ def _export(options: argparse.Namespace) -> int:
         if path.suffix in USD:
             writer.write_stage(frames, path, _colouring(options, frames))
         else:
+            _refuse_colours(options)
             writer.write_series(frames, path)
     except OSError as error:
         raise SceneError("FILE", options.file, f"it must be a file that can be written ({error})") from None
     print(f"{path}: {len(frames)} frames, {len(frames.lattice.nodes)} nodes")
     return 0
+
+
+def _refuse_colours(options: argparse.Namespace) -> None:
+    for name in ("field", "colour_map", "range"):
+        value = getattr(options, name)
+        if value is not None:
+            raise SceneError(
+                f"--{name.replace('_', '-')}", value, "it is for USD; ParaView colours by any field itself"
+            )
 
 
 def _colouring(options: argparse.Namespace, frames: Frames):

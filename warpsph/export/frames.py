@@ -83,9 +83,10 @@ class FrameWriter:
         self,
         simulation: Simulation,
         times: Sequence[float],
-        run: Path,
+        run: Path | str,
         followers: Sequence[Callable[[Frames], Follower]] = (),
     ):
+        run = Path(run)
         self._folder = run / FOLDER
         former = _about(run) if simulation.steps else None
         clear(run, simulation.time if former else -1.0)
@@ -191,8 +192,9 @@ class Frames(Sequence):
         SceneError: it is no folder of a run with frames.
     """
 
-    def __init__(self, run: Path):
-        self.run, self.about = run, _about(run)
+    def __init__(self, run: Path | str):
+        self.run = Path(run)
+        self.about = _about(self.run)
         if self.about is None:
             raise SceneError("DIR", str(run), "it must be the folder of a run that kept frames (`--frames N`)")
         self.times, self.rate = tuple(self.about["times"]), self.about["rate"]
