@@ -125,14 +125,14 @@ def test_a_run_that_goes_on_keeps_its_earlier_frames(tmp_path):
     simulation.run(until=2e-3, observers=[FrameWriter(simulation, evenly(4e-3, 8), tmp_path / "parts")])
     beyond = tmp_path / "parts" / "frames" / "000005.npz"
     beyond.write_bytes((tmp_path / "parts" / "frames" / "000004.npz").read_bytes())
-    (tmp_path / "parts" / "frames" / "000006.npz.part").write_bytes(b"torn")
+    (tmp_path / "parts" / "frames" / ".000006.part.npz").write_bytes(b"torn")
     np.savez(beyond, time=2.4e-3, step=0)
     writer = FrameWriter(simulation, evenly(4e-3, 8), tmp_path / "parts")
     assert not beyond.exists()
     simulation.run(observers=[writer])
     one, other = Frames(tmp_path / "whole"), Frames(tmp_path / "parts")
     assert one.numbers == other.numbers == list(range(9)) and one.codes == other.codes
-    assert list((tmp_path / "parts" / "frames").glob("*.part")) == []
+    assert list((tmp_path / "parts" / "frames").glob(".*")) == []
     for a, b in zip(one, other, strict=True):
         assert a.time == pytest.approx(b.time, abs=whole.time_step_limit)
 

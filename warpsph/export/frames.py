@@ -10,7 +10,6 @@ Every file is written under another name and renamed, so that a run that dies le
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from ..scene.lattice import Lattice
 from ..simulation.fields import FIELDS, green_strain, mean_stress, von_mises
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
+from .files import whole
 from .walls import Wall, walls_of
 
 FOLDER = "frames"
@@ -37,7 +37,7 @@ DERIVED = {
     "von_mises_stress": lambda frame: von_mises(frame.field("stress"), frame.lattice.continuum),
     "mean_stress": lambda frame: mean_stress(frame.field("stress"), frame.lattice.continuum),
 }
-FRAME_FILE = re.compile(r"\d{6}\.npz(\.part)?")
+FRAME_FILE = re.compile(r"\d{6}\.npz|\.\d{6}\.part\.npz")
 ROUNDING = 1e-9
 
 
@@ -54,7 +54,7 @@ def clear(run: Path, after: float = -1.0) -> None:
 
 
 def _earlier(path: Path, time: float) -> bool:
-    return path.suffix == ".npz" and float(_load(path)["time"]) <= time * (1.0 + ROUNDING)
+    return path.name[0] != "." and float(_load(path)["time"]) <= time * (1.0 + ROUNDING)
 
 
 class Follower(Protocol):
@@ -273,10 +273,8 @@ def _about(run: Path) -> dict | None:
 
 
 def _save(path: Path, arrays: Mapping[str, object]) -> None:
-    temporary = path.with_name(path.name + ".part")
-    with temporary.open("wb") as file:
-        np.savez(file, **arrays)
-    os.replace(temporary, path)
+    with whole(path) as temporary:
+        np.savez(temporary, **arrays)
 
 
 def _load(path: Path) -> dict[str, np.ndarray]:

@@ -6,7 +6,6 @@ VTK itself, an optional extra.
 
 from __future__ import annotations
 
-import os
 import shutil
 from functools import cache
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..scene.lattice import Lattice
+from .files import in_space, whole
 from .frames import Frame, Frames
 
 # Stored components in VTK's order of a symmetric tensor.
@@ -48,15 +48,14 @@ def write_series(frames: Frames, path: Path) -> None:
         part = {"timestep": repr(frame.time), "part": "0", "file": f"{folder.name}/{file.name}"}
         ElementTree.SubElement(collection, "DataSet", part)
     ElementTree.indent(root)
-    temporary = path.with_name(path.name + ".part")
-    ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
-    os.replace(temporary, path)
+    with whole(path) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
 def _body(frame: Frame, fields: tuple[str, ...]):
     core, model, _, support = _vtk()
     body, points = model.vtkPolyData(), core.vtkPoints()
-    points.SetData(support.numpy_to_vtk(_in_space(frame.field("position")), deep=True))
+    points.SetData(support.numpy_to_vtk(in_space(frame.field("position")), deep=True))
     body.SetPoints(points)
     body.SetVerts(_cells(np.arange(len(frame.lattice.nodes))[:, None]))
     if frame.lattice.dim == 1:
@@ -95,7 +94,7 @@ def _array(name: str, values: np.ndarray, lattice: Lattice):
         shown, names = np.zeros((len(values), 6), dtype=np.float32), COMPONENTS
         shown[:, [TENSOR[pair] for pair in tensor]] = values
     elif values.ndim == 2:
-        shown = _in_space(values).astype(np.float32)
+        shown = in_space(values).astype(np.float32)
     elif values.ndim == 3:
         shown = shown.reshape(len(values), -1)
     array = support.numpy_to_vtk(np.ascontiguousarray(shown), deep=True)
@@ -103,12 +102,6 @@ def _array(name: str, values: np.ndarray, lattice: Lattice):
     for k, part in enumerate(names):
         array.SetComponentName(k, part)
     return array
-
-
-def _in_space(vectors: np.ndarray) -> np.ndarray:
-    space = np.zeros((len(vectors), 3))
-    space[:, : vectors.shape[1]] = vectors
-    return space
 
 
 def _write(body, path: Path) -> None:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from ..errors import SceneError
 from ..simulation.history import read_history
 from ..simulation.plots import BRIGHT, COLOUR_MAP, DARK, DOTS_PER_INCH, axis_label
+from .files import whole
 from .frames import Frame, Frames
 from .quantity import Quantity
 from .view import View
@@ -43,14 +44,12 @@ def animate(frames: Frames, quantity: Quantity, path: Path) -> None:
     view = View.of(frames, quantity)
     figure, axes = _single(view)
     movie = writer(fps=FRAMES_A_SECOND)
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-    with movie.saving(figure, str(temporary), MOVING_DOTS_PER_INCH):
+    with whole(path) as temporary, movie.saving(figure, str(temporary), MOVING_DOTS_PER_INCH):
         for frame in frames:
             axes.clear()
             view.draw(axes, frame)
             axes.set_title(_title(frames, frame))
             movie.grab_frame()
-    temporary.replace(path)
 
 
 def plot_overview(frames: Frames, quantity: Quantity, path: Path) -> None:

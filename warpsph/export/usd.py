@@ -11,7 +11,6 @@ of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 from .. import __version__
 from ..simulation.fields import component_names
 from .colours import Colouring, whole_span
+from .files import in_space, whole
 from .frames import Frame, Frames
 from .quantity import quantity
 from .walls import WallMesh
@@ -38,9 +38,7 @@ def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) 
     if colouring is None:
         shown = quantity(None, frames)
         colouring = Colouring(shown, whole_span(shown, frames))
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-    temporary.unlink(missing_ok=True)
-    try:
+    with whole(path) as temporary:
         stage = Usd.Stage.CreateNew(str(temporary))
         drawing = Drawing(stage, frames, colouring)
         drawing.describe()
@@ -50,9 +48,6 @@ def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) 
                 stage.Save()  # appends: what is in the file leaves the memory
         drawing.span_time(frames.codes)
         stage.Save()
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 class Drawing:
@@ -162,9 +157,9 @@ class NodePoints:
 
     def set(self, position: np.ndarray, velocity: np.ndarray, colour: np.ndarray, code: Usd.TimeCode) -> None:
         """Write positions [m], velocities [m/s], both (n, d), and colours (n, 3) of a frame."""
-        points = _in_space(position)
+        points = _single(position)
         self._points.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
-        self._points.CreateVelocitiesAttr().Set(Vt.Vec3fArray.FromNumpy(_in_space(velocity)), code)
+        self._points.CreateVelocitiesAttr().Set(Vt.Vec3fArray.FromNumpy(_single(velocity)), code)
         self._points.CreateExtentAttr().Set(_extent(points, 0.5 * self._width), code)
         self._colour.Set(Vt.Vec3fArray.FromNumpy(colour), code)
 
@@ -183,11 +178,8 @@ class NodePoints:
             primvar.Set(array.FromNumpy(np.ascontiguousarray(column)), code)
 
 
-def _in_space(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (n, d) as float32 (n, 3), zero along the axes they do not have."""
-    space = np.zeros((len(vectors), 3), dtype=np.float32)
-    space[:, : vectors.shape[1]] = vectors
-    return space
+def _single(vectors: np.ndarray) -> np.ndarray:
+    return in_space(vectors).astype(np.float32)
 
 
 def _extent(points: np.ndarray, radius: float) -> Vt.Vec3fArray:

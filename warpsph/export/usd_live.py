@@ -7,7 +7,6 @@ one flattened stage takes its place and the folder goes. A frame costs the same 
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from pxr import Gf, Sdf, Usd, Vt
 
 from ..simulation.plots import percentiles, span_of
 from .colours import Colouring
+from .files import whole
 from .frames import Frames
 from .quantity import quantity
 from .usd import ROOT, Drawing, write_stage
@@ -76,9 +76,8 @@ class LiveStage:
         }
         layer = stage.GetRootLayer()
         layer.GetPrimAtPath(ROOT).SetInfo("clips", {"default": clips})
-        temporary = self._path.with_name(f".{self._path.stem}.part{self._path.suffix}")
-        layer.Export(str(temporary))
-        os.replace(temporary, self._path)
+        with whole(self._path) as temporary:
+            layer.Export(str(temporary))
 
     def close(self) -> None:
         """Put one flattened stage in the place of all."""
