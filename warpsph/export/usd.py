@@ -1,7 +1,7 @@
 """A run as one USD stage, for usdview, Omniverse, Blender and Houdini.
 
     /Run                    Xform; warpsph:time is the exact simulated time of each frame [s]
-    /Run/MaterialNodes      Points, with every field as a primvar
+    /Run/MaterialNodes      Points, coloured by one field, with stress, strain and flags as primvars
     /Run/AuxiliaryNodes     Points in the middle of the cells, hidden at first
     /Run/Walls/…            a Mesh for what holds or moves the body's edge
 
