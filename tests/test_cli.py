@@ -121,6 +121,7 @@ def test_results_go_to_runs_scene_unless_told(tmp_path):
     assert run("elastic_bar", "--until", "1e-4", "--quiet") == 0
     assert sorted(p.name for p in (tmp_path / "runs" / "elastic_bar").iterdir()) == [
         "field.png",
+        "frames",
         "history.csv",
         "history.png",
         "summary.json",

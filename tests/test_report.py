@@ -57,9 +57,9 @@ def test_run_is_made_once_and_read_back(bar, tmp_path):
     assert result.history["u"][-1] == pytest.approx(0.01, rel=1e-3)
     # The frames: the start, then the first step at or after each time.
     step = result.summary["time_step"]["max"]
-    np.testing.assert_allclose(result.frames["time"], (0.0, 0.004, 0.01), atol=step)
-    assert (result.frames["time"] >= np.array((0.0, 0.004, 0.01)) * (1.0 - 1e-9)).all()
-    np.testing.assert_allclose(result.at("displacement", 1)[-1], result.frames["time"][1], rtol=1e-3)
+    np.testing.assert_allclose(result.times, (0.0, 0.004, 0.01), atol=step)
+    assert (result.times >= np.array((0.0, 0.004, 0.01)) * (1.0 - 1e-9)).all()
+    np.testing.assert_allclose(result.at("displacement", 1)[-1], result.times[1], rtol=1e-3)
     assert bar.progress(folder) == 1.0
     assert "11 nodes" in (folder / "log.txt").read_text()
 
@@ -87,7 +87,7 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
     assert broken.done(tmp_path / "broken")
     result = broken.read(tmp_path / "broken")
     assert "non-finite" in result.summary["error"]
-    assert len(result.frames["time"]) == 2, "the frame at 10 ms was never reached"
+    assert len(result.times) == 2, "the frame at 10 ms was never reached"
     section = Section(Prose("t", "x", ()), [Row("q", 1.0)], [], [result])
     write_markdown(tmp_path / "r.md", "title", [], [section])
     assert "broke down" in (tmp_path / "r.md").read_text()

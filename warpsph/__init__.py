@@ -17,6 +17,7 @@ A scene is built from named parts and run by a `Simulation`:
 """
 
 from .errors import NonFiniteError, SceneError, WarpSPHError
+from .export.frames import Frames, FrameWriter
 from .scene import (
     BodyForce,
     Box,
@@ -69,6 +70,8 @@ __all__ = [
     "EdgeForce",
     "Elastic",
     "Fixed",
+    "FrameWriter",
+    "Frames",
     "Free",
     "FreeSurface",
     "History",

@@ -13,6 +13,8 @@ from ..errors import SceneError
 from ..ground.precision import PRECISIONS
 from ..scene.validate import number
 from .catalogue import load, shipped
+from .exporting import add_export, add_recording, recorders
+from .plotting import add_plot
 from .runner import run, writable
 
 
@@ -53,7 +55,11 @@ def _parser() -> argparse.ArgumentParser:
     running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
     running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
     running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
+    add_recording(running)
     running.set_defaults(command=_run)
+
+    add_plot(commands)
+    add_export(commands)
 
     reporting = commands.add_parser(
         "report",
@@ -96,6 +102,7 @@ def _run(options: argparse.Namespace) -> int:
             raise SceneError("--until", options.until, "it must be a number above 0 [s]") from None
     file = load(options.scene)
     scene, values = file.build(options.set)
+    folder = Path(options.out or Path("runs") / file.name)
     passed = run(
         file,
         scene,
@@ -103,8 +110,9 @@ def _run(options: argparse.Namespace) -> int:
         device=options.device,
         precision=options.precision,
         until=until,
-        folder=Path(options.out or Path("runs") / file.name),
+        folder=folder,
         quiet=options.quiet,
+        watching=recorders(options, folder, scene.duration if until is None else until),
     )
     return 0 if passed else 1
 

@@ -68,3 +68,17 @@ class History:
         """Close the file."""
         if self._file:
             self._file.close()
+
+
+def read_history(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Columns and units of a history file by name; an unfinished last line is left out.
+
+    Raises:
+        OSError: there is no such file.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    names = [cell.rsplit(" [", 1)[0] for cell in header]
+    units = [cell.rsplit(" [", 1)[-1].rstrip("]") for cell in header]
+    table = np.array([row for row in rows if len(row) == len(header)], dtype=float).reshape(-1, len(header))
+    return dict(zip(names, table.T, strict=True)), dict(zip(names, units, strict=True))

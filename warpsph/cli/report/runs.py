@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -16,12 +15,13 @@ import numpy as np
 
 from ... import __version__
 from ...errors import SceneError
+from ...export.frames import Frames, FrameWriter
 from ...scene.lattice import Lattice
 from ...scene.scene import Scene
+from ...simulation.history import read_history
 from ...simulation.time_step import divide, time_step_limit
 from ..catalogue import SceneFile, load
 from ..runner import run as run_scene
-from .frames import Frames
 
 OVERHEAD = 1000  # nodes whose work costs as much time as starting a step's kernels on a CPU
 
@@ -59,8 +59,7 @@ class Run:
         """
         try:
             summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            with np.load(folder / "frames.npz") as file:
-                asked = file["asked"].tolist()
+            asked = Frames(folder).times
         except (OSError, ValueError, KeyError):
             return False
         file, _, values = self.build()
@@ -68,7 +67,7 @@ class Run:
             summary["warpsph_version"] == __version__
             and summary["scene"] == file.name
             and summary["parameters"] == json.loads(json.dumps(values))
-            and asked == list(self.frames)
+            and asked == self.frames
         )
 
     def make(self, folder: Path, device: str | None) -> None:
@@ -91,7 +90,7 @@ class Run:
                     until=None,
                     folder=folder,
                     quiet=False,
-                    watching=[lambda simulation: Frames(simulation, self.frames, folder / "frames.npz")],
+                    watching=[lambda simulation: FrameWriter(simulation, self.frames, folder)],
                 )
             except SceneError as error:  # its checks could not be evaluated: the run keeps its summary
                 print(f"warpsph: {error}")
@@ -108,14 +107,9 @@ class Run:
 
     def read(self, folder: Path) -> Result:
         """What it gave."""
-        with (folder / "history.csv").open(newline="", encoding="utf-8") as file:
-            header, *rows = list(csv.reader(file))
-        table = np.array(rows, dtype=float)
-        history = {name.rsplit(" [", 1)[0]: table[:, k] for k, name in enumerate(header)}
-        with np.load(folder / "frames.npz") as file:
-            frames = dict(file)
+        history, _ = read_history(folder / "history.csv")
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        return Result(self, folder, summary, history, frames)
+        return Result(self, folder, summary, history, Frames(folder))
 
 
 @dataclass(frozen=True)
@@ -127,14 +121,14 @@ class Result:
         folder: where.
         summary: its `summary.json`.
         history: its columns, name → values.
-        frames: its `frames.npz`, name → values.
+        frames: its frames.
     """
 
     run: Run
     folder: Path
     summary: Mapping
     history: Mapping[str, np.ndarray]
-    frames: Mapping[str, np.ndarray]
+    frames: Frames
 
     @cached_property
     def _built(self):
@@ -170,8 +164,11 @@ class Result:
         values = [check["value"] for check in self.summary["checks"] if check["name"] == name]
         return math.nan if not values or values[0] is None else values[0]
 
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the frames it has [s]."""
+        return np.array([frame.time for frame in self.frames])
+
     def at(self, field: str, frame: int = -1) -> np.ndarray:
-        """A field of a frame; `displacement` follows from the positions."""
-        if field == "displacement":
-            return self.frames["position"][frame] - self.lattice.nodes
-        return self.frames[field][frame]
+        """A field of a frame."""
+        return self.frames[frame].field(field)
