@@ -16,6 +16,8 @@ A scene is built from named parts and run by a `Simulation`:
 (11, 1)
 """
 
+__version__ = "0.1.0"
+
 from .errors import NonFiniteError, SceneError, WarpSPHError
 from .scene import (
     BodyForce,
@@ -58,8 +60,6 @@ from .simulation.measures import (
     trace_ridge,
 )
 from .simulation.simulation import Observer, Simulation
-
-__version__ = "0.1.0"
 
 __all__ = [
     "BodyForce",
