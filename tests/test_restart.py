@@ -1,13 +1,9 @@
 """Checkpoints: a run that goes on from one ends bit for bit where one ends that never stopped."""
 
-import io
-import json
-
 import numpy as np
 import pytest
 import warp as wp
 
-import warpsph
 from warpsph import (
     BodyForce,
     Box,
@@ -28,11 +24,10 @@ from warpsph import (
     Roller,
     Rotating,
     Scene,
-    SceneError,
     Simulation,
     edge,
 )
-from warpsph.simulation.checkpoint import Checkpoint, Checkpoints, Interval, write_checkpoint
+from warpsph.simulation.checkpoint import Checkpoint, Checkpoints, Interval
 
 SOIL = PerzynaVonMises(
     young_modulus=1e5, poisson_ratio=0.3, density=2000.0, fluidity=5.0, yield_size=200.0, hardening=-500.0
@@ -82,7 +77,7 @@ def wheel():
 SCENES = {"slope": slope, "footing": footing, "wheel": wheel}
 
 
-class Stop(Exception):
+class StopError(Exception):
     pass
 
 
@@ -94,7 +89,7 @@ class Stopping:
 
     def observe(self, simulation):
         if simulation.steps == self.steps:
-            raise Stop
+            raise StopError
 
 
 def started(scene, precision, folder):
@@ -170,7 +165,7 @@ def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(name, precision, tmp_p
     simulation, history = started(scene, precision, tmp_path / "b")
     for stop in (whole.steps // 3, whole.steps // 2 + 1):
         checkpoints = Checkpoints(simulation, history, tmp_path / "b" / "checkpoint.npz", Interval(steps=7))
-        with pytest.raises(Stop):
+        with pytest.raises(StopError):
             simulation.run(observers=[history, checkpoints, Stopping(stop)])
         simulation, history = resumed(_again(name), precision, tmp_path / "b")
         assert stop - 7 < simulation.steps <= stop

@@ -42,6 +42,18 @@ class NonFiniteError(WarpSPHError, ArithmeticError):
         )
 
 
+class StoppedError(WarpSPHError):
+    """A signal asked a run to stop, and it did after a whole step.
+
+    Attributes:
+        status: exit status of the command, 128 + the signal's number.
+    """
+
+    def __init__(self, message: str, signal: int):
+        self.status = 128 + signal
+        super().__init__(message)
+
+
 def _short(value: object, limit: int = 120) -> str:
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from .lattice import Lattice
-from .validate import choice, field_of_position, vector
+from .validate import choice, field_of_position, index, vector
 
 
 class Selection:
@@ -100,6 +100,26 @@ class where(Selection):  # noqa: N801
         decimals = 12 - int(np.ceil(np.log10(extent)))
         points = np.round(lattice.nodes, decimals)
         return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
+
+
+@dataclass(frozen=True, eq=False)
+class chosen(Selection):  # noqa: N801
+    """Nodes by their numbers in the lattice: what a `where` has found, in a stored scene."""
+
+    numbers: np.ndarray
+
+    def __post_init__(self):
+        numbers = np.asarray(self.numbers)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
+            raise SceneError("chosen.numbers", self.numbers, "it must be a sequence of whole numbers")
+        object.__setattr__(self, "numbers", numbers)
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        mask = np.zeros(len(lattice.nodes), dtype=bool)
+        for number in (self.numbers.min(initial=0), self.numbers.max(initial=0)):
+            index("chosen.numbers", number, below=len(mask))
+        mask[self.numbers] = True
+        return mask
 
 
 @dataclass(frozen=True)
