@@ -110,7 +110,7 @@ def run(
     passed = error is None and all(check.passed for check in checks)
     if checks and not (quiet and passed):
         print(table(checks))
-    say(f"results in {folder}/: summary.json, history.csv, {', '.join(pictures)}")
+    say(f"results in {folder}/: summary.json, history.csv, scene.toml, {', '.join(pictures)}")
     return passed
 
 
