@@ -14,7 +14,7 @@ from warpsph.simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, I
 from warpsph.simulation.files import write_whole
 
 KILLS = 50
-LONGEST_LIFE = 0.25  # [s]
+LONGEST_LIFE = 0.12  # [s]
 
 
 def run_to_the_end(folder):

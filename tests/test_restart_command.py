@@ -239,7 +239,7 @@ def test_scene_written_by_hand_runs(tmp_path):
         ("courant = 0.5", "curant = 7", r"numerics\.curant = 7 .*mean courant\?"),
         ('"free"', '"loose"', "PrescribedVelocity.velocity = 'loose' .*function of time"),
         ("function = {", 'function = { code = "output.probes.0.function" } #', "names no scene file"),
-        ("[shape]", "velocity = { values = 'v' }\n[shape]", "velocity = 'v' .*one of"),
+        ("[shape]", "velocity = { values = 'v' }\n[shape]", "velocity.values = 'v' .*one of"),
         ("[shape]", "velocity = [1.0]\n[shape]", "velocity = .*must return 2 finite"),
         ("[shape]", "velocity = 3\n[shape]", "velocity = 3 .*list of numbers"),
         ("[numerics]", "[run]\nprecision = 3\n[numerics]", "run.precision = 3 .*a text"),

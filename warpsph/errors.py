@@ -37,8 +37,8 @@ class NonFiniteError(WarpSPHError, ArithmeticError):
         self.step, self.time, self.node = step, time, node
         at = ", ".join(f"{x:.6g}" for x in position)
         super().__init__(
-            f"velocity or stress became non-finite in step {step} (t = {time:.6g} s) at node {node}, "
-            f"initially at ({at}) m: the state can not be advanced; try a smaller courant number"
+            f"velocity, stress or displacement became non-finite in step {step} (t = {time:.6g} s) at node "
+            f"{node}, initially at ({at}) m: the state can not be advanced; try a smaller courant number"
         )
 
 

@@ -98,7 +98,7 @@ class SceneFile:
             yield
         except WarpSPHError:
             raise
-        except Exception as error:  # a user's function may raise anything
+        except (Exception, SystemExit) as error:  # a user's function may raise anything
             path = Path(self.module.__file__)
             if not _lines(path, error):
                 raise
@@ -137,7 +137,7 @@ def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
     try:
         with _importing_from(neighbours):
             spec.loader.exec_module(module)
-    except Exception as error:  # a user's file may raise anything
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
@@ -154,7 +154,7 @@ def _importing_from(folder: Path) -> Iterator[None]:
         sys.path.remove(str(folder))
 
 
-def _located(path: Path, error: Exception) -> SceneError:
+def _located(path: Path, error: BaseException) -> SceneError:
     """The error with the last line of the scene file it passed through."""
     if isinstance(error, SceneError):
         return error
@@ -163,6 +163,6 @@ def _located(path: Path, error: Exception) -> SceneError:
     return SceneError("scene", str(path), f"the file raised {type(error).__name__}{where}: {error}")
 
 
-def _lines(path: Path, error: Exception) -> list[int]:
+def _lines(path: Path, error: BaseException) -> list[int]:
     """The lines of the file that the error passed through."""
     return [f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]

@@ -25,6 +25,7 @@ from .output import EdgeForce, NodeValue, Output, Probe
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
 from .shape import Mapped, Placed, Shape
+from .validate import choice
 
 FREE = "free"
 SELECTIONS = ("on", "first", "second", "inner")  # fields in which a text is the name of an edge
@@ -143,18 +144,13 @@ class _Reader:
     def _table(self, table: Mapping, path: str) -> object:
         names = path.split(".")
         if "values" in table and "type" not in table:
-            if table["values"] not in self._arrays:
-                raise SceneError(path, table["values"], one_of(self._arrays, table["values"]))
-            return self._arrays[table["values"]]
+            return self._arrays[choice(f"{path}.values", table["values"], self._arrays)]
         if "code" in table:
             if self._code is None:
                 raise SceneError(path, table["code"], "it is code of a scene file, which this scene does not name")
             return _follow(self._code(path), str(table["code"]))
         plain = PLAIN.get(next(name for name in reversed(names) if not name.isdecimal()))
-        kinds, chosen_type = types(), table.get("type")
-        if plain is None and (not isinstance(chosen_type, str) or chosen_type not in kinds):
-            raise SceneError(f"{path}.type", chosen_type, one_of(kinds, chosen_type))
-        kind = plain or kinds[chosen_type]
+        kind = plain or types()[choice(f"{path}.type", table.get("type"), types())]
         given = {
             name: self.value(part, f"{path}.{name}") for name, part in table.items() if plain or name != "type"
         }

@@ -29,10 +29,10 @@ class Selection:
         return np.ones(len(lattice.faces), dtype=bool)
 
     def __and__(self, other: Selection) -> Selection:
-        return Both(self, _selection(other))
+        return Both(self, other)
 
     def __or__(self, other: Selection) -> Selection:
-        return Either(self, _selection(other))
+        return Either(self, other)
 
     def __invert__(self) -> Selection:
         return Outside(self)
@@ -137,6 +137,9 @@ class Both(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) & self.second.nodes(lattice)
 
@@ -151,6 +154,9 @@ class Either(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) | self.second.nodes(lattice)
 
@@ -163,6 +169,9 @@ class Outside(Selection):
     """Nodes not in the selection."""
 
     inner: Selection
+
+    def __post_init__(self):
+        _selection(self.inner)
 
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return ~self.inner.nodes(lattice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import math
@@ -112,8 +113,9 @@ class _Rows:
             while left:
                 left = left[self._file.write(left) :]
         except OSError as error:
-            self._file.seek(self._end)
-            self._file.truncate()
+            with contextlib.suppress(OSError):
+                self._file.truncate(self._end)
+                self._file.seek(self._end)
             if not self._failed:
                 print(f"warpsph: {self._path} can not be written now ({error.strerror})", file=sys.stderr)
             self._failed = True

@@ -72,7 +72,7 @@ class Simulation:
             time_step: Δt [s]; `time_step_limit` unless given, which it must not exceed.
 
         Raises:
-            NonFiniteError: velocity or stress stopped being finite.
+            NonFiniteError: velocity, stress or displacement stopped being finite.
         """
         dt = self.time_step_limit
         if time_step is not None:
@@ -89,7 +89,7 @@ class Simulation:
             observers: told after every step.
 
         Raises:
-            NonFiniteError: velocity or stress stopped being finite; what the observers have stays theirs.
+            NonFiniteError: velocity, stress or displacement stopped being finite; observers keep what they have.
         """
         end = self.scene.duration if until is None else number("until", until, at_least=self.time)
         observers = tuple(observers)
