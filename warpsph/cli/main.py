@@ -112,14 +112,16 @@ def _run(options: argparse.Namespace) -> int:
     file = open_scene(options.scene or str(Path(options.resume) / SCENE))
     before = again.settings or getattr(file, "run", {})
     scene, values = file.build(options.set)
+    until = until or before.get("until")
+    folder = Path(options.out or options.resume or Path("runs") / file.name)
     passed = run(
         file,
         scene,
         values,
         device=options.device or before.get("device"),
         precision=options.precision or before.get("precision", "float64"),
-        until=until or before.get("until"),
-        folder=Path(options.out or options.resume or Path("runs") / file.name),
+        until=until,
+        folder=folder,
         quiet=options.quiet,
         restart=again,
     )
