@@ -19,7 +19,7 @@ import os, signal, time
 from warpsph import *
 PARAMETERS = (
     Parameter("velocity", 1.0, "m/s", "of the end"),
-    Parameter("fault", "none", "-", "what", choices=("none", "scene", "killed", "nan", "check", "slow")),
+    Parameter("fault", "none", "-", "what", choices=("none", "scene", "killed", "nan", "check", "raise", "slow")),
 )
 
 def scene(p):
@@ -43,6 +43,7 @@ def moved(p):
     return lambda t: float("nan") if p.fault == "nan" and t > 0.005 else p.velocity
 
 def checks(run):
+    assert run.parameters.fault != "raise", "no judge"
     bound = 0.01 if run.parameters.fault != "check" else 0.0
     return [Check("end", run.history["u"][-1], 0.010001 * run.parameters.velocity, "m", bound)]
 '''
@@ -104,8 +105,8 @@ def test_wrong_options_are_refused(option, message, bar, capsys):
 
 
 def test_sweep_survives_its_members_and_tells_all_of_them_in_one_table(bar, tmp_path, capsys):
-    """A scene that is refused, a process that is killed, a NaN and a failed check beside one that passes."""
-    assert sweep("--set", "fault=none,scene,killed,nan,check", "--set", "velocity=2", "--out", "out") == 1
+    """Scene refused, process killed, NaN, failed check, checks that raise; beside one that passes."""
+    assert sweep("--set", "fault=none,scene,killed,nan,check,raise", "--set", "velocity=2", "--out", "out") == 1
     rows = table(tmp_path / "out")
     found = {name.split(",")[0].removeprefix("fault="): row for name, row in rows.items()}
     assert {fault: row["status"] for fault, row in found.items()} == {
@@ -114,7 +115,9 @@ def test_sweep_survives_its_members_and_tells_all_of_them_in_one_table(bar, tmp_
         "killed": "failed to run",
         "nan": "broke down",
         "check": "failed",
+        "raise": "failed to run",
     }
+    assert "AssertionError" in found["raise"]["message"] and "no judge" in found["raise"]["message"]
     assert "spacing = 0.3" in found["scene"]["message"] and "non-finite in step" in found["nan"]["message"]
     assert "ended by signal 9" in capsys.readouterr().out
     assert all(row["velocity"] == "2" for row in rows.values())

@@ -225,7 +225,7 @@ def refusal(folder, scene=None, precision="float64"):
     with pytest.raises(SceneError) as caught:
         resumed(slope() if scene is None else scene, precision, folder)
     message = str(caught.value)
-    assert message.startswith(f"--resume = '{folder / 'checkpoint.npz'}") and "\n" not in message
+    assert message.startswith(f"checkpoint = '{folder / 'checkpoint.npz'}") and "\n" not in message
     return message
 
 

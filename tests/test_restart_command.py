@@ -132,7 +132,7 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--resume", "nowhere"], r"--resume = 'nowhere/checkpoint\.npz' .*there is no checkpoint"),
+        (["--resume", "nowhere"], r"checkpoint = 'nowhere/checkpoint\.npz' .*there is no checkpoint"),
         (["block.py", "--resume", "out", "--set", "wave=0.002"], "of another scene, or of other parameters"),
         (["elastic_bar", "--resume", "out"], "of another scene, or of other parameters, than elastic_bar"),
         (["--resume", "out", "--precision", "float32"], "in float64, the run in float32"),

@@ -50,6 +50,7 @@ from .scene import (
     region,
     where,
 )
+from .simulation.checkpoint import Checkpoint, write_checkpoint
 from .simulation.history import History
 from .simulation.measures import (
     Sampler,
@@ -65,6 +66,7 @@ __all__ = [
     "BodyForce",
     "Box",
     "Check",
+    "Checkpoint",
     "Disc",
     "EdgeForce",
     "Elastic",
@@ -103,4 +105,5 @@ __all__ = [
     "smallest_distance",
     "trace_ridge",
     "where",
+    "write_checkpoint",
 ]

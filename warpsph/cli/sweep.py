@@ -80,6 +80,7 @@ class Member(SceneRun):
         if status == 2:  # there is no checkpoint, or it is refused
             status = _call(command, folder)
         if status not in (0, 1):
+            (folder / "summary.json").unlink(missing_ok=True)  # its checks raised: it is not done
             raise RuntimeError(said(folder) if status > 0 else f"its process ended by signal {-status}")
         if not (folder / "summary.json").is_file():
             raise RuntimeError(said(folder))

@@ -56,7 +56,7 @@ class Checkpoint:
     history: Mapping[str, np.ndarray]
 
     @staticmethod
-    def read(path: Path) -> Checkpoint:
+    def read(path: Path | str) -> Checkpoint:
         """Read a checkpoint.
 
         Raises:
@@ -67,17 +67,17 @@ class Checkpoint:
                 content = {name: file[name] for name in file.files}
             header = json.loads(content.pop("header").tobytes())
         except OSError as error:
-            raise SceneError("--resume", str(path), f"there is no checkpoint ({error.strerror})") from None
+            raise SceneError("checkpoint", str(path), f"there is no checkpoint ({error.strerror})") from None
         except Exception as error:  # reading damaged bytes may raise anything
-            raise SceneError("--resume", str(path), f"it is damaged or no checkpoint ({error})") from None
+            raise SceneError("checkpoint", str(path), f"it is damaged or no checkpoint ({error})") from None
         if header["version"] != __version__:
             allowed = f"it is of warpsph {header['version']}, this is {__version__}"
-            raise SceneError("--resume", str(path), allowed)
+            raise SceneError("checkpoint", str(path), allowed)
         parts = (
             {name.removeprefix(part): value for name, value in content.items() if name.startswith(part)}
             for part in (STATE, HISTORY)
         )
-        return Checkpoint(path, header, *parts)
+        return Checkpoint(Path(path), header, *parts)
 
     def restore(self, simulation: Simulation) -> None:
         """Bring a new simulation of the same scene to where this one was.
@@ -87,17 +87,17 @@ class Checkpoint:
         """
         if self.header["precision"] != simulation.precision.name:
             allowed = f"it is in {self.header['precision']}, the run in {simulation.precision.name}"
-            raise SceneError("--resume", str(self.path), allowed)
+            raise SceneError("checkpoint", str(self.path), allowed)
         if self.header["scene"] != fingerprint(simulation.scene):
             allowed = f"it is of another scene, or of other parameters, than {simulation.scene.name} now has"
-            raise SceneError("--resume", str(self.path), allowed)
+            raise SceneError("checkpoint", str(self.path), allowed)
         try:
             simulation.restore(self.arrays, self.header["values"])
         except KeyError as error:
-            raise SceneError("--resume", str(self.path), f"it holds other arrays: {error}") from None
+            raise SceneError("checkpoint", str(self.path), f"it holds other arrays: {error}") from None
 
 
-def write_checkpoint(simulation: Simulation, path: Path, history: History | None = None) -> None:
+def write_checkpoint(simulation: Simulation, path: Path | str, history: History | None = None) -> None:
     """Write a simulation, and its history if there is one, into a file that is whole or not there.
 
     Raises:
@@ -116,7 +116,7 @@ def write_checkpoint(simulation: Simulation, path: Path, history: History | None
     text = np.frombuffer(json.dumps(header).encode("utf-8"), dtype=np.uint8)
     packed = io.BytesIO()  # a disk that fills up then meets one plain write
     np.savez(packed, header=text, **content)
-    write_whole(path, lambda file: file.write(packed.getbuffer()))
+    write_whole(Path(path), lambda file: file.write(packed.getbuffer()))
 
 
 class Checkpoints:
