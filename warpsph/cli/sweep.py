@@ -93,6 +93,8 @@ def _call(command: Sequence[str], folder: Path) -> int:
     with (folder / "log.txt").open("w", encoding="utf-8") as log:
         process = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
     _processes.add(process)
+    if _stopping.is_set():  # the signal came just before
+        process.terminate()
     try:
         return process.wait()
     finally:
