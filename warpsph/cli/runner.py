@@ -21,6 +21,8 @@ from ..simulation.summary import summarise, write_json
 from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
+from .restart import Restart
+from .stored import StoredScene, store
 
 
 class ClosingObserver(Observer, Protocol):
@@ -31,7 +33,7 @@ class ClosingObserver(Observer, Protocol):
 
 
 def run(
-    file: SceneFile,
+    file: SceneFile | StoredScene,
     scene: Scene,
     parameters: Mapping[str, object],
     *,
@@ -41,15 +43,21 @@ def run(
     folder: Path,
     quiet: bool,
     watching: Sequence[Callable[[Simulation], ClosingObserver]] = (),
+    restart: Restart | None = None,
 ) -> bool:
     """Run a scene and write its results into a folder; True when it finished and all checks passed.
 
-    `watching` makes further observers of the simulation; they are closed before the summary is written.
+    `watching` makes further observers of the simulation; they are closed before the summary is written. `restart`
+    goes on from a checkpoint and writes new ones.
     """
     say = (lambda text: None) if quiet else print
     start = clock.perf_counter()
     simulation = Simulation(scene, device=device, precision=precision)
     folder = writable(folder)
+    restart = Restart() if restart is None else restart
+    restart.begin(simulation, folder)
+    how = {"device": simulation.device.alias, "precision": precision, "until": until}
+    store(folder, file, scene, parameters, how)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
@@ -58,20 +66,20 @@ def run(
     end = scene.duration if until is None else until
     component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
     with file.blamed():
-        history = History(simulation, folder / "history.csv")
+        history = History(simulation, folder / "history.csv", restart.history)
     progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
     observers = [history, progress, *(watch(simulation) for watch in watching)]
     begin, error = clock.perf_counter(), None
     try:
-        with file.blamed():
-            simulation.run(until=end, observers=observers)
+        with file.blamed(), restart.watching(simulation, history, folder) as checkpoints:
+            simulation.run(until=end, observers=[*observers, checkpoints])
             history.sample(simulation)
     except NonFiniteError as failure:
         error = str(failure)
     finally:
         for observer in observers:
             observer.close()
-    wall_time = clock.perf_counter() - begin
+    wall_time = clock.perf_counter() - begin + restart.wall_time
     checks: list[Check] = []
     finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
     try:
@@ -102,7 +110,7 @@ def run(
     passed = error is None and all(check.passed for check in checks)
     if checks and not (quiet and passed):
         print(table(checks))
-    say(f"results in {folder}/: summary.json, history.csv, {', '.join(pictures)}")
+    say(f"results in {folder}/: summary.json, history.csv, scene.toml, {', '.join(pictures)}")
     return passed
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from .lattice import Lattice
-from .validate import choice, field_of_position, vector
+from .validate import choice, field_of_position, index, vector
 
 
 class Selection:
@@ -29,10 +29,10 @@ class Selection:
         return np.ones(len(lattice.faces), dtype=bool)
 
     def __and__(self, other: Selection) -> Selection:
-        return Both(self, _selection(other))
+        return Both(self, other)
 
     def __or__(self, other: Selection) -> Selection:
-        return Either(self, _selection(other))
+        return Either(self, other)
 
     def __invert__(self) -> Selection:
         return Outside(self)
@@ -102,6 +102,26 @@ class where(Selection):  # noqa: N801
         return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
 
 
+@dataclass(frozen=True, eq=False)
+class chosen(Selection):  # noqa: N801
+    """Nodes by their numbers in the lattice: what a `where` has found, in a stored scene."""
+
+    numbers: np.ndarray
+
+    def __post_init__(self):
+        numbers = np.asarray(self.numbers)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
+            raise SceneError("chosen.numbers", self.numbers, "it must be a sequence of whole numbers")
+        object.__setattr__(self, "numbers", numbers)
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        mask = np.zeros(len(lattice.nodes), dtype=bool)
+        for number in (self.numbers.min(initial=0), self.numbers.max(initial=0)):
+            index("chosen.numbers", number, below=len(mask))
+        mask[self.numbers] = True
+        return mask
+
+
 @dataclass(frozen=True)
 class everywhere(Selection):  # noqa: N801
     """All nodes."""
@@ -117,6 +137,9 @@ class Both(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) & self.second.nodes(lattice)
 
@@ -131,6 +154,9 @@ class Either(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) | self.second.nodes(lattice)
 
@@ -143,6 +169,9 @@ class Outside(Selection):
     """Nodes not in the selection."""
 
     inner: Selection
+
+    def __post_init__(self):
+        _selection(self.inner)
 
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return ~self.inner.nodes(lattice)

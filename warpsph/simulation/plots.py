@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from ..scene.lattice import Lattice
 from ..scene.output import component
 from .fields import FIELDS, component_names
+from .files import write_whole
 from .history import History
 from .measures import split_cells
 from .simulation import Simulation
@@ -40,7 +41,7 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
     axes.set_ylabel(axis_label(y_name, history.unit(y_name)))
     axes.set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    save_picture(figure, path)
     return True
 
 
@@ -57,7 +58,12 @@ def plot_field(simulation: Simulation, path: Path) -> None:
     draw = {1: _line, 2: _cells, 3: _surface}[lattice.dim]
     figure = draw(position, values, lattice, label)
     figure.axes[0].set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    save_picture(figure, path)
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG, whole or not at all."""
+    write_whole(path, lambda file: figure.savefig(file, format="png", dpi=DOTS_PER_INCH, bbox_inches="tight"))
 
 
 def _line(position, values, lattice, label) -> Figure:

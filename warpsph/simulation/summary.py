@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import warp as wp
 
 from ..scene.check import Check
+from .files import write_whole
 from .simulation import Simulation
 
 
@@ -60,9 +60,8 @@ def summarise(
 
 def write_json(path: Path, content: Mapping) -> None:
     """Write a JSON file whole or not at all; non-finite numbers become null."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+    text = json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def _finite(value):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from ..errors import SceneError
 from ..ground.precision import PRECISIONS
@@ -72,3 +73,29 @@ def divide(duration: float, limit: float) -> tuple[int, float]:
     """
     steps = max(1, math.ceil(duration / limit * (1.0 - ROUNDING)))
     return steps, duration / steps
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of time covered in equal steps.
+
+    Attributes:
+        start, end: simulated times [s].
+        steps: how many.
+        first: number of steps made before it.
+    """
+
+    start: float
+    end: float
+    steps: int
+    first: int
+
+    @property
+    def time_step(self) -> float:
+        """Δt [s]."""
+        return (self.end - self.start) / self.steps
+
+    def time_after(self, steps: int) -> float | None:
+        """Simulated time [s] after so many steps since the run began; None when they lead out of the leg."""
+        made = steps - self.first
+        return self.start + (self.end - self.start) * (made / self.steps) if 0 <= made <= self.steps else None

@@ -133,7 +133,7 @@ class Stepper:
         )
 
     def first_non_finite(self) -> tuple[int, int] | None:
-        """(node, step) where velocity or stress first stopped being finite, or None."""
+        """(node, step) where velocity, stress or displacement first stopped being finite, or None."""
         node, step = self._health.numpy().tolist()
         return None if node < 0 else (node, step)
 
