@@ -27,6 +27,7 @@ from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
 from ..scene.validate import instance, listed
+from .settings import Settings
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -48,6 +49,7 @@ class SceneFile:
 
     name: str
     module: ModuleType
+    settings = Settings()  # how it is run unless asked otherwise
 
     @property
     def description(self) -> str:

@@ -1,4 +1,4 @@
-"""What `warpsph run` keeps of a run, and the command `warpsph export`."""
+"""What `warpsph run` keeps of a run for later, and the command `warpsph export`."""
 
 from __future__ import annotations
 
@@ -11,40 +11,22 @@ from typing import TypeVar
 
 from ..errors import SceneError, one_of
 from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
-from ..scene.validate import index, number
+from ..scene.validate import number
 from ..simulation.simulation import Simulation
+from .settings import Settings
 
 Made = TypeVar("Made")
-FRAMES = 50
 USD = (".usdc", ".usda")
 # Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
 WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
 
 
-def add_recording(running: argparse.ArgumentParser) -> None:
-    """Add the options of `warpsph run` that keep frames and write USD."""
-    running.add_argument(
-        "--frames",
-        default=str(FRAMES),
-        metavar="N",
-        help=f"frames to keep for plot and export (default: {FRAMES})",
-    )
-    running.add_argument("--usd", metavar="FILE", help="USD stage to write as the run goes on (.usdc or .usda)")
-
-
-def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Callable[[Simulation], Lenient]]:
+def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Simulation], Lenient]]:
     """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
-    try:
-        count = index("--frames", int(options.frames))
-    except ValueError:
-        raise SceneError("--frames", options.frames, "it must be a whole number, at least 0") from None
-    if options.usd and not count:
-        raise SceneError("--frames", count, "with --usd it must be at least 1")
-    path = _target("--usd", options.usd, USD) if options.usd else None
-    if not count:
-        clear(folder)  # those of a former run would be taken for this one's
-        return []
-    followers, times = [], evenly(end, count)
+    path = _target("--usd", settings.usd, USD) if settings.usd else None
+    if not settings.frames:
+        return [lambda simulation: _NoFrames(simulation, folder)]
+    followers, times = [], evenly(end, settings.frames)
     if path:
         from ..export.usd_live import LiveStage  # USD is slow to import
 
@@ -54,6 +36,20 @@ def recorders(options: argparse.Namespace, folder: Path, end: float) -> list[Cal
         return Lenient(lambda: FrameWriter(simulation, times, folder, followers), "no further frames are kept")
 
     return [recorder]
+
+
+class _NoFrames:
+    """Keeps no frames; a new run removes those of a former one, which would be taken for its own."""
+
+    def __init__(self, simulation: Simulation, folder: Path):
+        if not simulation.steps:
+            clear(folder)
+
+    def observe(self, simulation: Simulation) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing."""
 
 
 class Lenient:

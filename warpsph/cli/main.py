@@ -10,14 +10,14 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SceneError, StoppedError
-from ..ground.precision import PRECISIONS
-from ..scene.validate import number
+from ..simulation.checkpoint import CHECKPOINT, Checkpoint
 from . import new, sweep
 from .catalogue import load, shipped
-from .exporting import add_export, add_recording, recorders
+from .exporting import add_export, recorders
 from .plotting import add_plot
-from .restart import add_options, restart
+from .restart import Restart, parse_interval, settings_of
 from .runner import run, writable
+from .settings import add_settings, chosen
 from .stored import SCENE, open_scene
 
 
@@ -59,13 +59,12 @@ def _parser() -> argparse.ArgumentParser:
     running.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter; may be repeated"
     )
-    running.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
-    running.add_argument("--precision", help=f"{' or '.join(PRECISIONS)} (default: float64)")
-    running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
     running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
     running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
-    add_recording(running)
-    add_options(running)
+    running.add_argument(
+        "--resume", metavar="DIR", help="go on from the checkpoint in DIR, a run's folder, with its options"
+    )
+    add_settings(running)
     running.set_defaults(command=_run, usage_error=running.error)
     sweep.add_parser(commands)
     new.add_parser(commands)
@@ -106,31 +105,23 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    until = None
-    if options.until is not None:
-        try:
-            until = number("--until", float(options.until), above=0.0)
-        except ValueError:
-            raise SceneError("--until", options.until, "it must be a number above 0 [s]") from None
     if options.scene is None and options.resume is None:
         options.usage_error("the following arguments are required: SCENE, or --resume DIR")
-    again = restart(options)
+    checkpoint = None if options.resume is None else Checkpoint.read(Path(options.resume) / CHECKPOINT)
     file = open_scene(options.scene or str(Path(options.resume) / SCENE))
-    before = again.settings or getattr(file, "run", {})
+    settings = chosen(options, file.settings if checkpoint is None else settings_of(checkpoint))
     scene, values = file.build(options.set)
-    until = until or before.get("until")
     folder = Path(options.out or options.resume or Path("runs") / file.name)
+    end = scene.duration if settings.until is None else settings.until
     passed = run(
         file,
         scene,
         values,
-        device=options.device or before.get("device"),
-        precision=options.precision or before.get("precision", "float64"),
-        until=until,
-        folder=folder,
+        settings,
+        folder,
         quiet=options.quiet,
-        restart=again,
-        watching=recorders(options, folder, scene.duration if until is None else until),
+        watching=recorders(settings, folder, end),
+        restart=Restart(parse_interval(settings.checkpoint_every), checkpoint),
     )
     return 0 if passed else 1
 

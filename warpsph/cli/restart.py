@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import math
 import re
@@ -16,8 +15,8 @@ from ..errors import SceneError, StoppedError
 from ..simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, Interval
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
+from .settings import Settings
 
-OFTEN = Interval(seconds=600.0)
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -32,15 +31,6 @@ class Restart:
 
     interval: Interval | None = None
     checkpoint: Checkpoint | None = None
-
-    @property
-    def settings(self) -> Mapping[str, object]:
-        """Device, precision and end of the run that goes on; none for a new one."""
-        if self.checkpoint is None:
-            return {}
-        header = self.checkpoint.header
-        leg = header["values"]["leg"] or {}
-        return {"device": header["device"], "precision": header["precision"], "until": leg.get("end")}
 
     @property
     def wall_time(self) -> float:
@@ -60,15 +50,17 @@ class Restart:
             self.checkpoint.restore(simulation)
 
     @contextlib.contextmanager
-    def watching(self, simulation: Simulation, history: History, folder: Path) -> Iterator[Observer]:
+    def watching(
+        self, simulation: Simulation, history: History, folder: Path, settings: Settings
+    ) -> Iterator[Observer]:
         """An observer that writes the checkpoints; while it is in use, signals stop the run after a step.
 
-        A second signal does not wait for the step to end.
+        A second signal does not wait for the step to end. The settings are kept in the checkpoints.
         """
         if self.interval is None:
             yield _Nothing()
             return
-        checkpoints = Checkpoints(simulation, history, folder / CHECKPOINT, self.interval)
+        checkpoints = Checkpoints(simulation, history, folder / CHECKPOINT, self.interval, settings.table())
         stopper = _Stopper(checkpoints, folder)
         previous = {}
         if threading.current_thread() is threading.main_thread():
@@ -107,22 +99,12 @@ class _Stopper:
         )
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of `warpsph run` that have to do with checkpoints."""
-    parser.add_argument(
-        "--checkpoint-every",
-        metavar="N|T",
-        help="write a checkpoint every N steps (500), or every so much simulated time (0.2s) or wall time "
-        "(10min, 1h); default: 10min",
-    )
-    parser.add_argument("--resume", metavar="DIR", help="go on from the checkpoint in DIR, a run's folder")
-
-
-def restart(options: argparse.Namespace) -> Restart:
-    """What the options of `add_options` say."""
-    interval = OFTEN if options.checkpoint_every is None else parse_interval(options.checkpoint_every)
-    checkpoint = None if options.resume is None else Checkpoint.read(Path(options.resume) / CHECKPOINT)
-    return Restart(interval, checkpoint)
+def settings_of(checkpoint: Checkpoint) -> Settings:
+    """How the run was made that left a checkpoint."""
+    header = checkpoint.header
+    leg = header["values"]["leg"] or {}
+    found = {"device": header["device"], "precision": header["precision"], "until": leg.get("end")}
+    return Settings.read({name: value for name, value in (found | header["run"]).items() if value is not None})
 
 
 def parse_interval(text: str) -> Interval:

@@ -39,7 +39,7 @@ class SceneRun:
         return (len(scene.lattice.nodes) + OVERHEAD) * divide(scene.duration, time_step_limit(scene))[0]
 
     def done(self, folder: Path) -> bool:
-        """Whether the folder holds this run, by this version, with these parameters.
+        """Whether the folder holds this run to its end, by this version, with these parameters.
 
         A run that broke down is done as well: it would break down again.
         """
@@ -49,7 +49,8 @@ class SceneRun:
             return False
         file, _, values = self.build()
         return (
-            summary["warpsph_version"] == __version__
+            not summary["stopped"]
+            and summary["warpsph_version"] == __version__
             and summary["scene"] == file.name
             and summary["parameters"] == json.loads(json.dumps(values))
         )

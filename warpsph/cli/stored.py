@@ -11,7 +11,7 @@ import contextlib
 import hashlib
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,9 +25,10 @@ from ..scene.check import Check
 from ..scene.document import decode, encode
 from ..scene.parameter import assign
 from ..scene.scene import Scene
-from ..scene.validate import instance, number
+from ..scene.validate import instance
 from ..simulation.files import write_whole
 from .catalogue import SceneFile, load, load_file
+from .settings import Settings
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,7 +36,6 @@ else:
     import tomli as tomllib
 
 SCENE, COPY = "scene.toml", "scene_file.py"
-RUN = ("device", "precision", "until", "warpsph")
 CODE = ("file", "folder", "parameters", "sha256")
 NOTE = "# Repeat this run with: warpsph run {path}\n\n"
 
@@ -58,12 +58,17 @@ class StoredScene:
         return self.document.get("name", self.path.stem)
 
     @property
-    def run(self) -> Mapping:
-        """How it was run: device, precision, until."""
-        table = _table(self.document, "run", RUN)
-        for name in ("device", "precision"):
-            instance(f"run.{name}", table.get(name, ""), str, "a text")
-        number("run.until", table.get("until", 1.0), above=0.0)
+    def settings(self) -> Settings:
+        """How it was run."""
+        table = instance("run", self.document.get("run", {}), Mapping, "a table")
+        return Settings.read({name: value for name, value in table.items() if name != "warpsph"})
+
+    @property
+    def _code(self) -> Mapping:
+        table = instance("code", self.document.get("code", {}), Mapping, "a table")
+        for key, value in table.items():
+            if key not in CODE:
+                raise SceneError(f"code.{key}", value, one_of(CODE, key))
         return table
 
     @cached_property
@@ -73,7 +78,7 @@ class StoredScene:
         Raises:
             SceneError: the file is gone or is no longer the one that was run.
         """
-        code = _table(self.document, "code", CODE)
+        code = self._code
         if not code:
             return None
         path = self.path.parent / str(code.get("file"))
@@ -86,7 +91,7 @@ class StoredScene:
 
     @cached_property
     def _values(self) -> dict[str, object]:
-        given = _table(self.document, "code", CODE).get("parameters", {})
+        given = self._code.get("parameters", {})
         given = instance("code.parameters", given, Mapping, "a table")
         return assign(self.source.parameters, [f"{k}={v}" for k, v in given.items()]) if self.source else {}
 
@@ -149,7 +154,7 @@ def read_toml(path: Path) -> dict:
 
 
 def store(
-    folder: Path, file: SceneFile | StoredScene, scene: Scene, values: Mapping[str, object], run: Mapping
+    folder: Path, file: SceneFile | StoredScene, scene: Scene, values: Mapping[str, object], settings: Settings
 ) -> None:
     """Write `scene.toml` and what belongs to it into a folder.
 
@@ -158,12 +163,12 @@ def store(
         file: where the scene came from.
         scene: the scene.
         values: of its parameters.
-        run: how it is run: device, precision, until; None is left out.
+        settings: how it is run; the USD file is left out, which a repetition would overwrite.
     """
     if isinstance(file, StoredScene) and file.path.resolve() == (folder / SCENE).resolve():
         return  # it may be written by hand
     document, arrays = encode(scene)
-    document["run"] = {name: value for name, value in run.items() if value is not None} | {"warpsph": __version__}
+    document["run"] = replace(settings, usd=None).table() | {"warpsph": __version__}
     source = file.source if isinstance(file, StoredScene) else file
     if source is not None:
         path = Path(source.module.__file__)
@@ -189,11 +194,3 @@ def store(
 
 def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _table(document: Mapping, name: str, allowed: Sequence[str]) -> Mapping:
-    table = instance(name, document.get(name, {}), Mapping, "a table")
-    for key, value in table.items():
-        if key not in allowed:
-            raise SceneError(f"{name}.{key}", value, one_of(allowed, key))
-    return table

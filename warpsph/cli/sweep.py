@@ -30,6 +30,7 @@ from .queue import make_missing
 from .restart import SIGNALS
 from .runner import writable
 from .scene_run import SceneRun
+from .settings import count
 from .stored import SCENE, read_toml
 
 INTERRUPTED = 128 + signal.SIGINT
@@ -46,9 +47,11 @@ class Member(SceneRun):
     Args:
         name, scene, settings: see `SceneRun`.
         precision: float32 or float64.
+        frames: how many it keeps.
     """
 
     precision: str = "float64"
+    frames: int = 0
 
     def cost(self) -> float:
         """How much work it is, in node-steps; nothing when its scene is refused."""
@@ -58,12 +61,14 @@ class Member(SceneRun):
             return 0.0
 
     def done(self, folder: Path) -> bool:
-        """Whether the folder holds this run, of the scene file as it is now, in this precision."""
+        """Whether the folder holds this run, of the scene file as it is now, this precision and frames."""
         try:
             stored = read_toml(folder / SCENE)
             path = Path(load(self.scene).module.__file__)
             same = stored["code"]["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
-            return same and stored["run"]["precision"] == self.precision and super().done(folder)
+            how = stored["run"]
+            same = same and (how["precision"], how["frames"]) == (self.precision, self.frames)
+            return same and super().done(folder)
         except (OSError, ValueError, KeyError, SceneError):
             return False
 
@@ -73,7 +78,8 @@ class Member(SceneRun):
         (folder / "summary.json").unlink(missing_ok=True)
         command = [sys.executable, "-m", "warpsph", "run", self.scene, "--out", str(folder)]
         command += [part for setting in self.settings for part in ("--set", setting)]
-        command += ["--precision", self.precision, *(["--device", device] if device else [])]
+        command += ["--precision", self.precision, "--frames", str(self.frames)]
+        command += ["--device", device] if device else []
         status = 2
         if (folder / CHECKPOINT).is_file():
             status = _call([*command, "--resume", str(folder)], folder)
@@ -163,7 +169,7 @@ def row(member: Member, folder: Path) -> dict[str, object]:
     return found | ({f"last {name}": value for name, value in zip(header[2:], rows[-1][2:], strict=True)})
 
 
-def members(scene: str, settings: Sequence[str], precision: str) -> list[Member]:
+def members(scene: str, settings: Sequence[str], precision: str, frames: int = 0) -> list[Member]:
     """Every combination of the values in settings of the form `name=value,value,…`.
 
     Raises:
@@ -183,7 +189,7 @@ def members(scene: str, settings: Sequence[str], precision: str) -> list[Member]
     for combination in itertools.product(*choices.values()):
         assign(file.parameters, combination)
         name = re.sub(r"[^\w=.,+-]", "_", ",".join(combination)) or file.name
-        found[name] = Member(name, where, combination, precision)
+        found[name] = Member(name, where, combination, precision, frames)
     return list(found.values())
 
 
@@ -215,6 +221,7 @@ def add_parser(commands) -> None:
     )
     parser.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
     parser.add_argument("--precision", default="float64", help="float32 or float64 (default: float64)")
+    parser.add_argument("--frames", metavar="N", default="0", help="frames each run keeps (default: 0)")
     parser.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE-sweep)")
     parser.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
     parser.set_defaults(command=_sweep)
@@ -226,7 +233,7 @@ def _sweep(options: argparse.Namespace) -> int:
     precision_of(options.precision)
     if options.device and not options.dask:
         choose_device(options.device)
-    chosen = members(options.scene, options.set, options.precision)
+    chosen = members(options.scene, options.set, options.precision, count(options.frames))
     folder = writable(Path(options.out or Path("runs") / f"{load(options.scene).name}-sweep")).absolute()
     try:
         with _workers(options) as workers:

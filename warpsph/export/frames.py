@@ -23,9 +23,9 @@ import numpy as np
 from ..errors import SceneError, one_of
 from ..scene.lattice import Lattice
 from ..simulation.fields import FIELDS, green_strain, mean_stress, von_mises
+from ..simulation.files import whole
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
-from .files import whole
 from .walls import Wall, walls_of
 
 FOLDER = "frames"

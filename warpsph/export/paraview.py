@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import SceneError
 from ..scene.lattice import Lattice
-from .files import in_space, whole
+from ..simulation.files import whole
+from .files import in_space
 from .frames import Frame, Frames
 
 # Stored components in VTK's order of a symmetric tensor.

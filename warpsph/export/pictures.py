@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..errors import SceneError
+from ..simulation.files import whole
 from ..simulation.history import read_history
 from ..simulation.plots import BRIGHT, COLOUR_MAP, DARK, DOTS_PER_INCH, axis_label
-from .files import whole
 from .frames import Frame, Frames
 from .quantity import Quantity
 from .view import View

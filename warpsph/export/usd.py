@@ -19,8 +19,9 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 
 from .. import __version__
 from ..simulation.fields import component_names
+from ..simulation.files import whole
 from .colours import Colouring, whole_span
-from .files import in_space, whole
+from .files import in_space
 from .frames import Frame, Frames
 from .quantity import quantity
 from .walls import WallMesh

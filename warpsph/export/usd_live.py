@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, Vt
 
+from ..simulation.files import whole
 from ..simulation.plots import percentiles, span_of
 from .colours import Colouring
-from .files import whole
 from .frames import Frames
 from .quantity import quantity
 from .usd import ROOT, Drawing, write_stage

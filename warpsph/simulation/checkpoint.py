@@ -45,7 +45,7 @@ class Checkpoint:
 
     Attributes:
         path: its file.
-        header: version, scene, precision, device, and the simulation's numbers.
+        header: version, scene, precision, device, the simulation's numbers, and how the run is made.
         arrays: the simulation's arrays by name.
         history: the history's arrays.
     """
@@ -97,8 +97,16 @@ class Checkpoint:
             raise SceneError("checkpoint", str(self.path), f"it holds other arrays: {error}") from None
 
 
-def write_checkpoint(simulation: Simulation, path: Path | str, history: History | None = None) -> None:
-    """Write a simulation, and its history if there is one, into a file that is whole or not there.
+def write_checkpoint(
+    simulation: Simulation, path: Path | str, history: History | None = None, run: Mapping | None = None
+) -> None:
+    """Write a simulation into a file that is whole or not there.
+
+    Args:
+        simulation: the simulation.
+        path: the file.
+        history: its history, to go on with it.
+        run: how the run is made, to be kept in the header: texts and numbers by name.
 
     Raises:
         OSError: it can not be written; what stood there stays.
@@ -110,6 +118,7 @@ def write_checkpoint(simulation: Simulation, path: Path | str, history: History 
         "precision": simulation.precision.name,
         "device": simulation.device.alias,
         "values": values,
+        "run": dict(run or {}),
     }
     content = {f"{STATE}{name}": value for name, value in arrays.items()}
     content |= {f"{HISTORY}{name}": value for name, value in (history.state() if history else {}).items()}
@@ -129,10 +138,18 @@ class Checkpoints:
         history: its history.
         path: the file.
         interval: how often.
+        run: see `write_checkpoint`.
     """
 
-    def __init__(self, simulation: Simulation, history: History, path: Path, interval: Interval):
-        self._history, self._path, self._interval = history, path, interval
+    def __init__(
+        self,
+        simulation: Simulation,
+        history: History,
+        path: Path,
+        interval: Interval,
+        run: Mapping | None = None,
+    ):
+        self._history, self._path, self._interval, self._run = history, path, interval, run
         self._mark(simulation)
 
     def observe(self, simulation: Simulation) -> None:
@@ -149,7 +166,7 @@ class Checkpoints:
         """Write one now; whether that worked."""
         self._mark(simulation)
         try:
-            write_checkpoint(simulation, self._path, self._history)
+            write_checkpoint(simulation, self._path, self._history, self._run)
         except OSError as error:
             print(f"warpsph: {self._path} can not be written now ({error.strerror})", file=sys.stderr)
             return False

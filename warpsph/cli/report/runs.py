@@ -21,6 +21,7 @@ from ...simulation.history import read_history
 from ..catalogue import SceneFile
 from ..runner import run as run_scene
 from ..scene_run import SceneRun
+from ..settings import Settings
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,8 @@ class Run(SceneRun):
                     file,
                     scene,
                     values,
-                    device=device,
-                    precision="float64",
-                    until=None,
-                    folder=folder,
+                    Settings(device=device, frames=len(self.frames)),
+                    folder,
                     quiet=False,
                     watching=[lambda simulation: FrameWriter(simulation, self.frames, folder)],
                 )
