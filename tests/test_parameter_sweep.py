@@ -209,3 +209,12 @@ def test_member_without_a_log_says_so(tmp_path):
     assert said(tmp_path) == "it left no log"
     with pytest.raises(SceneError):
         members("no_such_scene", [], "float64")
+
+
+def test_members_keep_no_frames_unless_asked(bar, tmp_path):
+    """Those that have none are made again when frames are asked for."""
+    asked = ("--set", "velocity=1", "--out", "out", "--quiet")
+    frames = tmp_path / "out" / "runs" / "velocity=1" / "frames"
+    assert sweep(*asked) == 0 and not frames.exists()
+    assert sweep(*asked, "--frames", "2") == 0 and len(list(frames.glob("0*.npz"))) == 3
+    assert sweep(*asked, "--frames", "few") == 2
