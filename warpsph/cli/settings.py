@@ -54,6 +54,7 @@ class Settings:
     def table(self) -> dict[str, object]:
         """What `read` takes; what is None is left out."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        values["usd"] = self.usd and str(Path(self.usd).absolute())  # the run may go on from another folder
         return {name: value for name, value in values.items() if value is not None}
 
 
@@ -86,7 +87,7 @@ def chosen(options: argparse.Namespace, before: Settings) -> Settings:
         "precision": options.precision,
         "until": None if options.until is None else _until(options.until),
         "frames": None if options.frames is None else count(options.frames),
-        "usd": options.usd and str(Path(options.usd).absolute()),  # it may go on from another folder
+        "usd": options.usd,
         "checkpoint_every": options.checkpoint_every,
     }
     settings = replace(before, **{name: value for name, value in given.items() if value is not None})

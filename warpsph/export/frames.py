@@ -22,14 +22,14 @@ import numpy as np
 
 from ..errors import SceneError, one_of
 from ..scene.lattice import Lattice
-from ..simulation.fields import FIELDS, green_strain, mean_stress, von_mises
+from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
 from ..simulation.files import whole
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
 from .walls import Wall, walls_of
 
 FOLDER = "frames"
-STORED = ("displacement", "velocity", "stress", "equivalent_plastic_strain", "density", "free_surface")
+STORED = ("displacement", "velocity", "stress", "density", "free_surface")  # and the internal variables
 # Fields that follow from the stored ones; displacement is stored since float32 can not hold it in a position.
 DERIVED = {
     "position": lambda frame: frame.lattice.nodes + frame.field("displacement"),
@@ -98,9 +98,11 @@ class FrameWriter:
                 former["rate"],
             )
         self._times = np.array(times)
-        self._fields = [name for name in STORED if name in simulation.fields()]
-        if simulation.scene.output.field not in (*self._fields, *DERIVED):
-            self._fields.append(simulation.scene.output.field)
+        own, internal = fields_of(simulation.scene), internal_variables(simulation.scene)
+        names = [name for name in (*STORED, *internal) if name in own]
+        if simulation.scene.output.field not in (*names, *DERIVED):
+            names.append(simulation.scene.output.field)
+        self._fields = {name: own[name].unit for name in names}
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(simulation, rate)
         self._due, self._followers = -1.0, ()
@@ -220,7 +222,13 @@ class Frames(Sequence):
     @property
     def fields(self) -> tuple[str, ...]:
         """Names of the fields its frames have."""
-        return tuple(name for name in FIELDS if name in DERIVED or name in self.about["fields"])
+        kept = self.about["fields"]
+        known = [name for name in FIELDS if name in DERIVED or name in kept]
+        return (*known, *(name for name in kept if name not in known))
+
+    def unit(self, name: str) -> str:
+        """Unit of a field."""
+        return FIELDS[name].unit if name in FIELDS else self.about["fields"][name]
 
     @property
     def numbers(self) -> list[int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError, one_of
-from ..simulation.fields import FIELDS, component_names
+from ..simulation.fields import component_names
 from .frames import Frame, Frames
 
 
@@ -17,11 +17,13 @@ class Quantity:
 
     Args:
         field: name of the field.
+        unit: its unit.
         component: index of its component; the length of the vector when None.
         part: name of the component, empty for none.
     """
 
     field: str
+    unit: str
     component: int | None = None
     part: str = ""
 
@@ -34,11 +36,6 @@ class Quantity:
     def name(self) -> str:
         """A name for files: `stress_s12`, `velocity`."""
         return f"{self.field}_{self.part}" if self.part else self.field
-
-    @property
-    def unit(self) -> str:
-        """Its unit."""
-        return FIELDS[self.field].unit
 
     @property
     def label(self) -> str:
@@ -55,17 +52,18 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     continuum, about = frames.lattice.continuum, frames.about
     if text is None:
         parts = component_names(about["field"], continuum)
-        return Quantity(about["field"], about["component"], parts[about["component"]] if parts else "")
+        part = parts[about["component"]] if parts else ""
+        return Quantity(about["field"], frames.unit(about["field"]), about["component"], part)
     field, colon, part = text.partition(":")
     if field not in frames.fields:
         raise SceneError("--field", text, one_of(frames.fields, field))
-    parts = component_names(field, continuum)
+    parts, unit = component_names(field, continuum), frames.unit(field)
     if part in parts:
-        return Quantity(field, parts.index(part), part)
+        return Quantity(field, unit, parts.index(part), part)
     if not colon and not parts:
-        return Quantity(field, 0)
+        return Quantity(field, unit, 0)
     if not colon and parts == continuum.axes:
-        return Quantity(field)
+        return Quantity(field, unit)
     if not parts:
         raise SceneError("--field", text, f"{field} has no components")
     raise SceneError("--field", text, one_of([f"{field}:{name}" for name in parts], text))

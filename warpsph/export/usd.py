@@ -27,7 +27,7 @@ from .quantity import quantity
 from .walls import WallMesh
 
 ROOT, MATERIAL, AUXILIARY, WALLS = "/Run", "/Run/MaterialNodes", "/Run/AuxiliaryNodes", "/Run/Walls"
-PRIMVARS = ("stress", "von_mises_stress", "mean_stress", "strain", "equivalent_plastic_strain", "free_surface")
+NO_PRIMVARS = ("position", "displacement", "velocity", "density")  # in the points, or in nobody's way
 FLAGS = ("free_surface",)
 PLAYBACK = 24.0  # [frames/s], of players that show every frame
 WALL_COLOUR = Gf.Vec3f(0.18, 0.18, 0.2)
@@ -66,7 +66,7 @@ class Drawing:
         self._time = self._root.CreateAttribute("warpsph:time", Sdf.ValueTypeNames.Double)
         self._nodes = NodePoints(stage, MATERIAL, frames.lattice.spacing)
         self._cells = NodePoints(stage, AUXILIARY, 0.5 * frames.lattice.spacing)
-        self._fields = [name for name in PRIMVARS if name in frames.fields]
+        self._fields = [name for name in frames.fields if name not in NO_PRIMVARS]
         for name in self._fields:
             self._nodes.declare(name, component_names(name, frames.lattice.continuum))
         UsdGeom.Scope.Define(stage, WALLS)

@@ -186,7 +186,7 @@ def types() -> dict[str, type]:
     while waiting:
         kind = waiting.pop()
         waiting += kind.__subclasses__()
-        own = kind.__module__.rpartition(".")[0] == __package__
+        own = kind.__module__.partition(".")[0] == __package__.partition(".")[0]
         if own and is_dataclass(kind) and kind not in (Condition, EdgeCondition, Mapped, where):
             found.append(kind)
     return {kind.__name__: kind for kind in found}

@@ -51,8 +51,12 @@ class Elastic:
         return math.sqrt(self.shear_modulus / self.density)
 
     def relaxation_modulus(self, dim: int) -> float:
-        """−dq/dε̄ at fixed strain [Pa]: how fast viscoplastic flow relaxes q; E in a bar, 3G otherwise."""
+        """−dq/dε̄ at fixed strain [Pa]: how fast inelastic flow relaxes q; E in a bar, 3G otherwise."""
         return self.young_modulus if dim == 1 else 3.0 * self.shear_modulus
+
+    def flow_rate(self, dim: int) -> float:
+        """Fastest rate at which inelastic flow relaxes the stress in slow loading [1/s]; 0 where nothing flows."""
+        return 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +85,7 @@ class PerzynaVonMises(Elastic):
         self._check("hardening", above=-self.young_modulus)
         self._check("residual_ratio", above=0.0, at_most=1.0)
 
-    def smallest_yield_size(self) -> float:
-        """The least Y that can occur [Pa]."""
-        return self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
+    def flow_rate(self, dim: int) -> float:
+        """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""
+        smallest_yield_size = self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
+        return self.relaxation_modulus(dim) * self.fluidity * self.exponent / smallest_yield_size

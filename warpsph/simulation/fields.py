@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ground.materials import law
+from ..ground.precision import PRECISIONS
 from ..scene.dimension import Continuum
 from ..scene.lattice import Lattice
 from ..scene.material import PerzynaVonMises
+from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
     """Names of the components of a field: s12, e11, y, or xy of a tensor; none of a scalar."""
-    shape, axes = FIELDS[name].shape, continuum.axes
+    shape, axes = FIELDS[name].shape if name in FIELDS else "(n,)", continuum.axes
     if shape == "(n, s)":
         return tuple(("s" if name == "stress" else "e") + part[1:] for part in continuum.stress_components)
     if shape == "(n, d)":
@@ -111,9 +114,6 @@ FIELDS: dict[str, Field] = {
         "(n, s)",
         "Green-Lagrange strain, components as of the stress",
         lambda s: green_strain(s.lattice, s.nodes.displacement.numpy()),
-    ),
-    "equivalent_plastic_strain": Field(
-        "-", "(n,)", "equivalent viscoplastic strain ε̄", lambda s: s.history.numpy()[:, 0].copy(), _has_yield
     ),
     "yield_size": Field("Pa", "(n,)", "size of the yield surface Y", _yield_size, _has_yield),
     "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
@@ -144,3 +144,17 @@ FIELDS: dict[str, Field] = {
         lambda s: s.scene.material.density * s.lattice.node_volumes()[0],
     ),
 }
+
+
+def fields_of(scene: Scene) -> dict[str, Field]:
+    """The fields of a scene by name: those of `FIELDS` it has, and the internal variables of its material."""
+    return {name: field for name, field in FIELDS.items() if field.available(scene)} | internal_variables(scene)
+
+
+def internal_variables(scene: Scene) -> dict[str, Field]:
+    """What the nodes of a scene remember of their material, by name."""
+    history = law(scene.material, scene.lattice.continuum, PRECISIONS["float64"]).history
+    return {
+        name: Field(unit, "(n,)", meaning, lambda s, k=k: s.history.numpy()[:, k].copy())
+        for k, (name, unit, meaning) in enumerate(history)
+    }

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..scene.lattice import Lattice
 from ..scene.output import component
-from .fields import FIELDS, component_names
+from .fields import component_names, fields_of
 from .files import write_whole
 from .history import History
 from .measures import split_cells
@@ -54,7 +54,7 @@ def plot_field(simulation: Simulation, path: Path) -> None:
         name = f"{name} {component_names(output.field, lattice.continuum)[output.component]}"
         values = component("Output", values, output.component)
     position = simulation.field("position")
-    label = axis_label(name, FIELDS[output.field].unit)
+    label = axis_label(name, fields_of(simulation.scene)[output.field].unit)
     draw = {1: _line, 2: _cells, 3: _surface}[lattice.dim]
     figure = draw(position, values, lattice, label)
     figure.axes[0].set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")

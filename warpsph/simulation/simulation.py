@@ -15,7 +15,7 @@ from ..scene.scene import Scene
 from ..scene.validate import instance, number, vector
 from ..step.step import Stepper
 from .device import choose_device
-from .fields import FIELDS
+from .fields import fields_of
 from .state import arrays, numbers, restore
 from .time_step import Leg, divide, time_step_limit
 
@@ -140,17 +140,15 @@ class Simulation:
         Raises:
             SceneError: this scene has no field of that name.
         """
-        names = [key for key, value in FIELDS.items() if value.available(self.scene)]
-        if name not in names:
-            raise SceneError("field", name, one_of(names, name))
-        return FIELDS[name].read(self)
+        fields = fields_of(self.scene)
+        if name not in fields:
+            raise SceneError("field", name, one_of(fields, name))
+        return fields[name].read(self)
 
     def fields(self) -> dict[str, str]:
         """The fields of this scene: name → "shape [unit] meaning"."""
         return {
-            name: f"{field.shape} [{field.unit}] {field.meaning}"
-            for name, field in FIELDS.items()
-            if field.available(self.scene)
+            name: f"{field.shape} [{field.unit}] {field.meaning}" for name, field in fields_of(self.scene).items()
         }
 
     def nearest_node(self, point: Iterable[float]) -> int:

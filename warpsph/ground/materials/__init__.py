@@ -1,4 +1,4 @@
-"""Material laws: one file each, and one row here."""
+"""Material laws: one file each, and one row here; see docs/materials.md."""
 
 from __future__ import annotations
 

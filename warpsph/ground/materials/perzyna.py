@@ -124,7 +124,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
     return Law(
         PerzynaParameters,
         fill,
-        history=(("equivalent_plastic_strain", "-"),),
+        history=(("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),),
         flow=flow,
         flow_stiffness=flow_stiffness,
         relax=relax,
