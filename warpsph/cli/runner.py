@@ -72,6 +72,8 @@ def run(
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )
+    if simulation.steps:
+        say(f"goes on from step {simulation.steps}, t = {simulation.time:.6g} s")
     end = scene.duration if settings.until is None else settings.until
     with file.blamed():
         history = History(simulation, folder / "history.csv", restart.history)
@@ -118,6 +120,8 @@ def run(
     if checks and not (quiet and passed):
         print(table(checks))
     say(f"results in {folder}/: {', '.join([SUMMARY, 'history.csv', 'scene.toml', *pictures])}")
+    if settings.frames:
+        say(f"all times on one sheet: warpsph plot {folder}")
     if stop is not None:
         raise stop
     return passed

@@ -23,7 +23,7 @@ from ..errors import SceneError
 from ..ground.precision import precision as precision_of
 from ..scene.parameter import assign
 from ..simulation.checkpoint import CHECKPOINT
-from ..simulation.device import choose_device
+from ..simulation.device import choose_device, start_warp
 from ..simulation.files import write_whole
 from .catalogue import load, shipped
 from .queue import make_missing
@@ -231,6 +231,7 @@ def _sweep(options: argparse.Namespace) -> int:
     if options.jobs < 1:
         raise SceneError("--jobs", options.jobs, "it must be at least 1")
     precision_of(options.precision)
+    start_warp()
     if options.device and not options.dask:
         choose_device(options.device)
     chosen = members(options.scene, options.set, options.precision, count(options.frames))
@@ -257,7 +258,7 @@ def _workers(options: argparse.Namespace):
     try:
         from distributed import Client
     except ImportError:
-        raise SceneError("--dask", options.dask, "it needs Dask: pip install 'warpsph[dask]'") from None
+        raise SceneError("--dask", options.dask, "it needs Dask: pip install distributed") from None
     try:
         client = Client(options.dask, timeout=10)
     except (OSError, ValueError) as error:

@@ -31,7 +31,7 @@ def _vtk():
         from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkIOXML
         from vtkmodules.util import numpy_support
     except ImportError:
-        raise SceneError("FILE", ".pvd", "ParaView files need VTK: pip install 'warpsph[vtk]'") from None
+        raise SceneError("FILE", ".pvd", "ParaView files need VTK: pip install vtk") from None
     return vtkCommonCore, vtkCommonDataModel, vtkIOXML, numpy_support
 
 

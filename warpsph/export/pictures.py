@@ -129,6 +129,7 @@ def _draw_history(axes, x: tuple, y: tuple, reference: Mapping | None) -> None:
         )
         axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel=x[0], ylabel=y[0])
+    axes.locator_params(axis="x", nbins=5)  # its labels are wide
     axes.grid(alpha=0.3)
 
 
