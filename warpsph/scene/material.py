@@ -16,6 +16,15 @@ class Elastic:
         young_modulus: E [Pa], > 0.
         poisson_ratio: ν [-], in (−1, 0.5); unused by a bar, which is in uniaxial stress.
         density: ρ [kg/m³], > 0.
+
+    Raises:
+        SceneError: a parameter is not allowed.
+
+    >>> Elastic(young_modulus=8e7, density=2000.0).wave_speed(dim=1)
+    200.0
+    >>> Elastic(young_modulus=8e7, density=-1.0)
+    Traceback (most recent call last):
+    warpsph.errors.SceneError: density = -1.0 is not allowed: it must be a finite number above 0.0
     """
 
     young_modulus: float
@@ -69,6 +78,15 @@ class PerzynaVonMises(Elastic):
         exponent: N [-], ≥ 1.
         hardening: H = dY/dε̄ [Pa]; negative softens.
         residual_ratio: r [-], in (0, 1]: softening ends at Y = r Y0 (the paper lets Y reach zero).
+
+    Raises:
+        SceneError: a parameter is not allowed.
+
+    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ; docs/method.md, section 1.
+
+    >>> soil = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
+    >>> soil.flow_rate(dim=1)  # E γ N/Y0 in a bar
+    400.0
     """
 
     fluidity: float

@@ -36,6 +36,9 @@ class BodyForce:
     Args:
         acceleration: [m/s²], one component an axis.
         factor: a number or a function of time, e.g. `Ramp(1.0)`.
+
+    >>> BodyForce((0.0, -9.81), lambda t: 2.0 * t)(0.5)
+    array([ 0.  , -9.81])
     """
 
     acceleration: tuple[float, ...]
@@ -73,6 +76,17 @@ class Scene:
 
     Raises:
         SceneError: a field is not allowed; the message names it, its value and what is allowed.
+
+    >>> from warpsph import Box, Elastic, Fixed, edge
+    >>> scene = Scene(
+    ...     shape=Box(size=(1.0, 1.0), spacing=0.5),
+    ...     material=Elastic(young_modulus=1e6, density=2000.0),
+    ...     conditions=[Fixed(edge("bottom"))],
+    ...     velocity=lambda x, y: (0.1 * y, 0.0),
+    ...     duration=1.0,
+    ... )
+    >>> scene.boundary.nodes, scene.initial_velocity.shape
+    (array([0, 3, 6]), (9, 2))
     """
 
     shape: Shape

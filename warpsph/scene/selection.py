@@ -43,6 +43,10 @@ class edge(Selection):  # noqa: N801 - written as a word in scenes
     """The nodes of a named edge: left, right, bottom, top, in 3D also front and back; `boundary` is all.
 
     Names refer to the axes of the lattice before it was rotated or mapped.
+
+    >>> from warpsph import Box
+    >>> edge("left").nodes(Box((1.0,), 0.5).lattice())
+    array([ True, False, False])
     """
 
     name: str
@@ -65,6 +69,10 @@ class region(Selection):  # noqa: N801
 
     Args:
         lower, upper: opposite corners [m].
+
+    >>> from warpsph import Box
+    >>> region((0.4,), (1.0,)).nodes(Box((1.0,), 0.5).lattice())
+    array([False,  True,  True])
     """
 
     lower: tuple[float, ...]
@@ -91,6 +99,10 @@ class where(Selection):  # noqa: N801
     """The nodes where a function of the initial position, f(x, y, …) with arrays, is true.
 
     Coordinates are rounded to 12 digits of the body's extent, so that `x <= 0.3` holds on a node at 0.3.
+
+    >>> from warpsph import Box
+    >>> (where(lambda x: x > 0.4) & ~edge("right")).nodes(Box((1.0,), 0.5).lattice())
+    array([False,  True, False])
     """
 
     function: Callable

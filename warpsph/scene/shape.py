@@ -97,6 +97,9 @@ class Disc(Shape):
         radius: radius [m].
         spacing: Δx [m].
         centre: centre [m].
+
+    >>> len(Disc(radius=1.0, spacing=0.5).lattice().cells)
+    12
     """
 
     radius: float

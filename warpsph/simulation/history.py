@@ -27,6 +27,20 @@ class History:
     Attributes:
         names: column names, `step` and `time` first.
         units: their units.
+
+    >>> from warpsph import Box, Elastic, NodeValue, Output, Probe, Scene, Simulation
+    >>> scene = Scene(
+    ...     shape=Box((1.0,), 0.1),
+    ...     material=Elastic(young_modulus=8e7, density=2000.0),
+    ...     velocity=lambda x: 0.5,
+    ...     duration=1e-3,
+    ...     output=Output(interval=0.0, probes=(Probe("u", "m", NodeValue("displacement", (1.0,))),)),
+    ... )
+    >>> simulation = Simulation(scene, device="cpu")
+    >>> history = History(simulation)
+    >>> simulation.run(observers=[history])
+    >>> history["time"].size == simulation.steps + 1, round(float(history["u"][-1]), 9)
+    (True, 0.0005)
     """
 
     def __init__(self, simulation: Simulation, path: Path | None = None, state: Mapping | None = None):
