@@ -133,6 +133,10 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
     ("arguments", "message"),
     [
         (["--resume", "nowhere"], r"checkpoint = 'nowhere/checkpoint\.npz' .*there is no checkpoint"),
+        (
+            ["--resume", "early"],
+            r"--resume = 'early' .*no checkpoint yet; .*: warpsph run early/scene\.toml --out early",
+        ),
         (["block.py", "--resume", "out", "--set", "wave=0.002"], "of another scene, or of other parameters"),
         (["elastic_bar", "--resume", "out"], "of another scene, or of other parameters, than elastic_bar"),
         (["--resume", "out", "--precision", "float32"], "in float64, the run in float32"),
@@ -146,6 +150,7 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
 def test_wrong_restart_is_refused_in_one_line(arguments, message, block, capsys):
     block()
     assert run("block.py", "--set", "stop_at=9", "--out", "out") == 128 + signal.SIGTERM
+    shutil.copytree("out", "early", ignore=shutil.ignore_patterns("checkpoint.npz"))
     capsys.readouterr()
     assert run(*arguments) == 2
     assert re.search(message, one_line(capsys))
