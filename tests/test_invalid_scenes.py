@@ -322,6 +322,13 @@ def wrong():
 OPTIONS = {"deadline": 1000, "suppress_health_check": list(HealthCheck), "database": None}
 
 
+@settings(max_examples=1000, **OPTIONS)
+@given(wrong())
+def test_a_thousand_wrong_scenes_are_refused(case):
+    check_refusal(*case)
+
+
+@pytest.mark.long
 @settings(max_examples=5000, **OPTIONS)
 @given(wrong())
 def test_five_thousand_wrong_scenes_are_refused(case):
@@ -368,7 +375,7 @@ ANYTHING = st.one_of(
 )
 
 
-@settings(max_examples=1000, **{**OPTIONS, "deadline": None})
+@settings(max_examples=400, **{**OPTIONS, "deadline": None})
 @given(st.sampled_from(PLACES), ANYTHING, st.sampled_from(["replace", "remove", "add"]))
 def test_document_with_something_wrong_is_refused_in_one_line_or_runs(place, value, change):
     """What is accepted is a scene: it is built, compiled and stepped."""

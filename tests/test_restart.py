@@ -319,7 +319,7 @@ def test_checkpoints_come_at_their_interval(interval, steps, tmp_path, monkeypat
     scene = slope(duration=0.1, numerics=Numerics(time_step=1e-3))
     simulation, history = started(scene, "float64", tmp_path)
     found = []
-    monkeypatch.setattr(checkpoint_module, "write_checkpoint", lambda s, path, h: found.append(s.steps))
+    monkeypatch.setattr(checkpoint_module, "write_checkpoint", lambda s, *rest: found.append(s.steps))
     simulation.run(observers=[Checkpoints(simulation, history, tmp_path / "c.npz", interval)])
     assert found == list(steps)
 
