@@ -132,6 +132,7 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--resume", "out", "--out", "other"], r"--out = 'other' .*goes on in its own folder, out;"),
         (["--resume", "nowhere"], r"checkpoint = 'nowhere/checkpoint\.npz' .*there is no checkpoint"),
         (
             ["--resume", "early"],

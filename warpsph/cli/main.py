@@ -107,7 +107,7 @@ def _list(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     if options.scene is None and options.resume is None:
         options.usage_error("the following arguments are required: SCENE, or --resume DIR")
-    checkpoint = None if options.resume is None else _checkpoint(Path(options.resume))
+    checkpoint = None if options.resume is None else _checkpoint(Path(options.resume), options.out)
     file = open_scene(options.scene or str(Path(options.resume) / SCENE))
     settings = chosen(options, file.settings if checkpoint is None else settings_of(checkpoint))
     scene, values = file.build(options.set)
@@ -126,7 +126,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if passed else 1
 
 
-def _checkpoint(folder: Path) -> Checkpoint:
+def _checkpoint(folder: Path, out: str | None) -> Checkpoint:
+    if out is not None and Path(out).resolve() != folder.resolve():
+        raise SceneError("--out", out, f"a run goes on in its own folder, {folder}; to branch off, copy that")
     if (folder / SCENE).is_file() and not (folder / CHECKPOINT).exists():
         again = f"warpsph run {folder / SCENE} --out {folder}"
         raise SceneError("--resume", str(folder), f"it has no checkpoint yet; start again with: {again}")
