@@ -28,7 +28,8 @@ from warpsph import (
 
 SIZE = (1.0, 0.5)  # unstretched [m]
 
-# The support must reach the next column of the stretched lattice; the published step's viscosity brings it to rest.
+# The support must reach the next column of the stretched lattice; the published step's viscosity brings it to
+# rest.
 NUMERICS = {**PUBLISHED, "courant": 0.9, "smoothing_ratio": 1.1}
 PARAMETERS = (
     Parameter("spacing", 0.05, "m", "distance between neighbouring nodes, unstretched"),

@@ -1,9 +1,16 @@
-"""Shared by all tests: the devices to run on."""
+"""Shared by all tests: the devices to run on, and the material that the docs add."""
+
+import sys
 
 import pytest
 import warp as wp
 
+from tests.documents import LAW, ROOT, blocks, run_as_module
+from warpsph.ground.materials import LAWS
+from warpsph.scene.document import types
 from warpsph.simulation.device import start_warp
+
+MAXWELL = "warpsph.ground.materials.maxwell"
 
 start_warp()
 
@@ -23,3 +30,19 @@ def device(request):
 def precision(request):
     """Both precisions."""
     return request.param
+
+
+@pytest.fixture(scope="session")
+def _maxwell_file(tmp_path_factory):
+    block = next(block for block in blocks(ROOT / "docs/materials.md", "python") if block.startswith(LAW))
+    return run_as_module(MAXWELL, block, tmp_path_factory.mktemp("materials"))
+
+
+@pytest.fixture
+def maxwell(_maxwell_file, monkeypatch):
+    """The material that docs/materials.md adds, as if its file and its row were there."""
+    monkeypatch.setitem(sys.modules, MAXWELL, _maxwell_file)
+    monkeypatch.setitem(LAWS, _maxwell_file.Maxwell, _maxwell_file.maxwell)
+    types.cache_clear()
+    yield _maxwell_file
+    types.cache_clear()

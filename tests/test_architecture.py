@@ -8,7 +8,7 @@ import pytest
 import warpsph
 
 PACKAGE = Path(warpsph.__file__).parent
-ROOMS = ("errors", "scene", "ground", "nodes", "operators", "step", "simulation", "cli")
+ROOMS = ("errors", "scene", "ground", "nodes", "operators", "step", "simulation", "export", "cli")
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
 
 

@@ -121,8 +121,11 @@ def test_results_go_to_runs_scene_unless_told(tmp_path):
     assert run("elastic_bar", "--until", "1e-4", "--quiet") == 0
     assert sorted(p.name for p in (tmp_path / "runs" / "elastic_bar").iterdir()) == [
         "field.png",
+        "frames",
         "history.csv",
         "history.png",
+        "scene.toml",
+        "scene_file.py",
         "summary.json",
     ]
 
@@ -400,15 +403,17 @@ def test_nan_ends_the_run_with_1_and_keeps_what_was_recorded(user_file, tmp_path
     assert summary["steps"] == 3 and summary["checks"] == []
 
 
-def test_an_interrupt_ends_a_run_in_one_line_and_keeps_its_history(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_in_one_line_with_history_and_checkpoint(number, tmp_path):
     out = tmp_path / "run"
     command = [sys.executable, "-m", "warpsph", "run", "gravity_slope", "--device", "cpu", "--out", str(out)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     history, limit = out / "history.csv", time.monotonic() + 60.0
     while time.monotonic() < limit and not (history.is_file() and len(history.read_text().splitlines()) > 3):
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert errors.strip() == "warpsph: interrupted; what was recorded so far is kept"
-    assert len(history.read_text().splitlines()) > 3
+    assert process.returncode == 128 + number
+    line = r"warpsph: stopped after step \d+, t = [\d.e-]+ s; go on with: warpsph run --resume (\S+)\n"
+    assert re.fullmatch(line, errors)[1] == str(out)
+    assert len(history.read_text().splitlines()) > 3 and (out / "checkpoint.npz").is_file()

@@ -6,14 +6,14 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from warpsph.cli import scene_run
 from warpsph.cli.main import main
-from warpsph.cli.report import runs as runs_module
+from warpsph.cli.queue import make_missing, processes
 from warpsph.cli.report.case import Picture, Row, Section, Table
 from warpsph.cli.report.cases import cases, elastic_bar, hanging_bar, wavy_surface
 from warpsph.cli.report.drawing import Curve, diagram
 from warpsph.cli.report.page import write_html, write_markdown
 from warpsph.cli.report.prose import TEXTS, Prose, prose
-from warpsph.cli.report.queue import make_missing
 from warpsph.cli.report.runs import Run
 
 SCENE = '''"""Bar for the tests."""
@@ -57,9 +57,9 @@ def test_run_is_made_once_and_read_back(bar, tmp_path):
     assert result.history["u"][-1] == pytest.approx(0.01, rel=1e-3)
     # The frames: the start, then the first step at or after each time.
     step = result.summary["time_step"]["max"]
-    np.testing.assert_allclose(result.frames["time"], (0.0, 0.004, 0.01), atol=step)
-    assert (result.frames["time"] >= np.array((0.0, 0.004, 0.01)) * (1.0 - 1e-9)).all()
-    np.testing.assert_allclose(result.at("displacement", 1)[-1], result.frames["time"][1], rtol=1e-3)
+    np.testing.assert_allclose(result.times, (0.0, 0.004, 0.01), atol=step)
+    assert (result.times >= np.array((0.0, 0.004, 0.01)) * (1.0 - 1e-9)).all()
+    np.testing.assert_allclose(result.at("displacement", 1)[-1], result.times[1], rtol=1e-3)
     assert bar.progress(folder) == 1.0
     assert "11 nodes" in (folder / "log.txt").read_text()
 
@@ -70,7 +70,7 @@ def test_run_is_made_again_for_other_parameters_frames_or_version(bar, tmp_path,
     assert not Run("bar", bar.scene, ("duration=0.005",), bar.frames).done(folder)
     assert not Run("bar", bar.scene, ("courant=0.5",), bar.frames).done(folder)
     assert not Run("bar", bar.scene, (), (0.0, 0.004)).done(folder)
-    monkeypatch.setattr(runs_module, "__version__", "9.9.9")
+    monkeypatch.setattr(scene_run, "__version__", "9.9.9")
     assert not bar.done(folder)
 
 
@@ -87,7 +87,7 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
     assert broken.done(tmp_path / "broken")
     result = broken.read(tmp_path / "broken")
     assert "non-finite" in result.summary["error"]
-    assert len(result.frames["time"]) == 2, "the frame at 10 ms was never reached"
+    assert len(result.times) == 2, "the frame at 10 ms was never reached"
     section = Section(Prose("t", "x", ()), [Row("q", 1.0)], [], [result])
     write_markdown(tmp_path / "r.md", "title", [], [section])
     assert "broke down" in (tmp_path / "r.md").read_text()
@@ -95,10 +95,10 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
 
 def test_only_missing_runs_are_made(bar, tmp_path, capsys):
     """In a process of its own; the second call finds it done."""
-    make_missing([bar], tmp_path / "runs", "cpu", jobs=1, quiet=False)
+    make_missing([bar], tmp_path / "runs", "cpu", processes(1), quiet=False)
     first = capsys.readouterr().out
     assert "1 runs, 0 of them done already" in first and "[1/1] bar" in first
-    make_missing([bar], tmp_path / "runs", "cpu", jobs=1, quiet=False)
+    make_missing([bar], tmp_path / "runs", "cpu", processes(1), quiet=False)
     second = capsys.readouterr().out
     assert "1 runs, 1 of them done already" in second and "[1/1]" not in second
 

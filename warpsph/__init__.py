@@ -16,7 +16,10 @@ A scene is built from named parts and run by a `Simulation`:
 (11, 1)
 """
 
+__version__ = "0.1.0"
+
 from .errors import NonFiniteError, SceneError, WarpSPHError
+from .export.frames import Frames, FrameWriter
 from .scene import (
     PUBLISHED,
     BodyForce,
@@ -49,6 +52,7 @@ from .scene import (
     region,
     where,
 )
+from .simulation.checkpoint import Checkpoint, write_checkpoint
 from .simulation.history import History
 from .simulation.measures import (
     Sampler,
@@ -60,17 +64,18 @@ from .simulation.measures import (
 )
 from .simulation.simulation import Observer, Simulation
 
-__version__ = "0.1.0"
-
 __all__ = [
     "PUBLISHED",
     "BodyForce",
     "Box",
     "Check",
+    "Checkpoint",
     "Disc",
     "EdgeForce",
     "Elastic",
     "Fixed",
+    "FrameWriter",
+    "Frames",
     "Free",
     "FreeSurface",
     "History",
@@ -105,4 +110,5 @@ __all__ = [
     "smallest_distance",
     "trace_ridge",
     "where",
+    "write_checkpoint",
 ]

@@ -37,9 +37,21 @@ class NonFiniteError(WarpSPHError, ArithmeticError):
         self.step, self.time, self.node = step, time, node
         at = ", ".join(f"{x:.6g}" for x in position)
         super().__init__(
-            f"velocity or stress became non-finite in step {step} (t = {time:.6g} s) at node {node}, "
-            f"initially at ({at}) m: the state can not be advanced; try a smaller courant number"
+            f"velocity, stress or displacement became non-finite in step {step} (t = {time:.6g} s) at node "
+            f"{node}, initially at ({at}) m: the state can not be advanced; try a smaller courant number"
         )
+
+
+class StoppedError(WarpSPHError):
+    """A signal asked a run to stop, and it did after a whole step.
+
+    Attributes:
+        status: exit status of the command, 128 + the signal's number.
+    """
+
+    def __init__(self, message: str, signal: int):
+        self.status = 128 + signal
+        super().__init__(message)
 
 
 def _short(value: object, limit: int = 120) -> str:

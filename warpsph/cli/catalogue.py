@@ -27,6 +27,7 @@ from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
 from ..scene.validate import instance, listed
+from .settings import Settings
 
 DEFAULT_NUMERICS = "numerics=default"
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -49,6 +50,7 @@ class SceneFile:
 
     name: str
     module: ModuleType
+    settings = Settings()  # how it is run unless asked otherwise
 
     @property
     def description(self) -> str:
@@ -81,11 +83,15 @@ class SceneFile:
         """
         own = [text for text in settings if "".join(text.split()) != DEFAULT_NUMERICS]
         values = assign(self.parameters if len(own) == len(settings) else self._parameters({}), own)
+        return self.build_from(values), values
+
+    def build_from(self, values: Mapping[str, object]) -> Scene:
+        """The scene with these values of all parameters."""
         with self.blamed():
             scene = self.module.scene(namespace(values))
         instance(f"{self.name}.scene(p)", scene, Scene, "a Scene")
         object.__setattr__(scene, "name", self.name)
-        return scene, values
+        return scene
 
     def checks(self, run: SimpleNamespace) -> list[Check]:
         """The checks of a finished run."""
@@ -102,7 +108,7 @@ class SceneFile:
             yield
         except WarpSPHError:
             raise
-        except Exception as error:  # a user's function may raise anything
+        except (Exception, SystemExit) as error:  # a user's function may raise anything
             path = Path(self.module.__file__)
             if not _lines(path, error):
                 raise
@@ -119,19 +125,33 @@ def load(name: str) -> SceneFile:
     path = scenes.get(name, Path(name).absolute())
     if not path.is_file():
         raise SceneError("scene", name, f"{one_of(scenes, name)}, or the path of a scene file")
+    return load_file(path, path.stem, path.parent)
+
+
+def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
+    """A scene file by path.
+
+    Args:
+        path: the file.
+        name: of the scene.
+        neighbours: folder of the modules it may import.
+
+    Raises:
+        SceneError: the file can not be loaded.
+    """
     spec = importlib.util.spec_from_file_location(f"warpsph_scene_{path.stem}", path)
     if spec is None:
-        raise SceneError("scene", name, "the file's name must end in .py")
+        raise SceneError("scene", str(path), "the file's name must end in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their module up there
     try:
-        with _importing_from(path.parent):
+        with _importing_from(neighbours):
             spec.loader.exec_module(module)
-    except Exception as error:  # a user's file may raise anything
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
-    return SceneFile(path.stem, module)
+    return SceneFile(name, module)
 
 
 @contextlib.contextmanager
@@ -144,7 +164,7 @@ def _importing_from(folder: Path) -> Iterator[None]:
         sys.path.remove(str(folder))
 
 
-def _located(path: Path, error: Exception) -> SceneError:
+def _located(path: Path, error: BaseException) -> SceneError:
     """The error with the last line of the scene file it passed through."""
     if isinstance(error, SceneError):
         return error
@@ -153,6 +173,6 @@ def _located(path: Path, error: Exception) -> SceneError:
     return SceneError("scene", str(path), f"the file raised {type(error).__name__}{where}: {error}")
 
 
-def _lines(path: Path, error: Exception) -> list[int]:
+def _lines(path: Path, error: BaseException) -> list[int]:
     """The lines of the file that the error passed through."""
     return [f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]

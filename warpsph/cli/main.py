@@ -9,11 +9,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .. import __version__
-from ..errors import SceneError
-from ..ground.precision import PRECISIONS
-from ..scene.validate import number
+from ..errors import SceneError, StoppedError
+from ..simulation.checkpoint import CHECKPOINT, Checkpoint
+from . import new, sweep
 from .catalogue import load, shipped
+from .exporting import add_export, recorders
+from .plotting import add_plot
+from .restart import Restart, parse_interval, settings_of
 from .runner import run, writable
+from .settings import add_settings, chosen
+from .stored import SCENE, open_scene
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,11 +29,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SceneError as error:
         print(f"warpsph: {error}", file=sys.stderr)
         return 2
+    except StoppedError as stop:
+        print(f"warpsph: {stop}", file=sys.stderr)
+        return stop.status
     except KeyboardInterrupt:
         print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of our output has gone, e.g. `warpsph list | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:  # a disk that is full, above all
+        print(f"warpsph: {error}", file=sys.stderr)
         return 1
 
 
@@ -44,16 +55,22 @@ def _parser() -> argparse.ArgumentParser:
     listing.set_defaults(command=_list)
 
     running = commands.add_parser("run", help="run a scene and judge it")
-    running.add_argument("scene", help="a shipped scene or the path of a scene file")
+    running.add_argument("scene", nargs="?", help="a shipped scene, or the path of a scene file or a scene.toml")
     running.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter; may be repeated"
     )
-    running.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
-    running.add_argument("--precision", default="float64", help=f"{' or '.join(PRECISIONS)} (default: float64)")
-    running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
     running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
     running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
-    running.set_defaults(command=_run)
+    running.add_argument(
+        "--resume", metavar="DIR", help="go on from the checkpoint in DIR, a run's folder, with its options"
+    )
+    add_settings(running)
+    running.set_defaults(command=_run, usage_error=running.error)
+    sweep.add_parser(commands)
+    new.add_parser(commands)
+
+    add_plot(commands)
+    add_export(commands)
 
     reporting = commands.add_parser(
         "report",
@@ -88,25 +105,34 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    until = None
-    if options.until is not None:
-        try:
-            until = number("--until", float(options.until), above=0.0)
-        except ValueError:
-            raise SceneError("--until", options.until, "it must be a number above 0 [s]") from None
-    file = load(options.scene)
+    if options.scene is None and options.resume is None:
+        options.usage_error("the following arguments are required: SCENE, or --resume DIR")
+    checkpoint = None if options.resume is None else _checkpoint(Path(options.resume), options.out)
+    file = open_scene(options.scene or str(Path(options.resume) / SCENE))
+    settings = chosen(options, file.settings if checkpoint is None else settings_of(checkpoint))
     scene, values = file.build(options.set)
+    folder = Path(options.out or options.resume or Path("runs") / file.name)
+    end = scene.duration if settings.until is None else settings.until
     passed = run(
         file,
         scene,
         values,
-        device=options.device,
-        precision=options.precision,
-        until=until,
-        folder=Path(options.out or Path("runs") / file.name),
+        settings,
+        folder,
         quiet=options.quiet,
+        watching=recorders(settings, folder, end),
+        restart=Restart(parse_interval(settings.checkpoint_every), checkpoint),
     )
     return 0 if passed else 1
+
+
+def _checkpoint(folder: Path, out: str | None) -> Checkpoint:
+    if out is not None and Path(out).resolve() != folder.resolve():
+        raise SceneError("--out", out, f"a run goes on in its own folder, {folder}; to branch off, copy that")
+    if (folder / SCENE).is_file() and not (folder / CHECKPOINT).exists():
+        again = f"warpsph run {folder / SCENE} --out {folder}"
+        raise SceneError("--resume", str(folder), f"it has no checkpoint yet; start again with: {again}")
+    return Checkpoint.read(folder / CHECKPOINT)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -118,6 +144,9 @@ def _report(options: argparse.Namespace) -> int:
     folder = writable(Path(options.out or default))
     try:
         report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
+    except StoppedError as stop:
+        print(f"warpsph: {stop}", file=sys.stderr)
+        return stop.status
     except KeyboardInterrupt:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
         return 130

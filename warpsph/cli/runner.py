@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Protocol
 
 from .. import __version__
-from ..errors import NonFiniteError, SceneError
+from ..errors import NonFiniteError, SceneError, StoppedError
 from ..scene.check import Check
 from ..scene.output import component
 from ..scene.scene import Scene
@@ -21,6 +22,12 @@ from ..simulation.summary import summarise, write_json
 from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
+from .restart import Restart
+from .settings import Settings
+from .stored import StoredScene, store
+
+SUMMARY = "summary.json"
+PICTURES = ("history.png", "field.png", "surface.png")
 
 
 class ClosingObserver(Observer, Protocol):
@@ -31,47 +38,60 @@ class ClosingObserver(Observer, Protocol):
 
 
 def run(
-    file: SceneFile,
+    file: SceneFile | StoredScene,
     scene: Scene,
     parameters: Mapping[str, object],
-    *,
-    device: str | None,
-    precision: str,
-    until: float | None,
+    settings: Settings,
     folder: Path,
+    *,
     quiet: bool,
     watching: Sequence[Callable[[Simulation], ClosingObserver]] = (),
+    restart: Restart | None = None,
 ) -> bool:
     """Run a scene and write its results into a folder; True when it finished and all checks passed.
 
-    `watching` makes further observers of the simulation; they are closed before the summary is written.
+    `watching` makes further observers of the simulation; they are closed before the summary is written. `restart`
+    goes on from a checkpoint and writes new ones.
+
+    Raises:
+        StoppedError: a signal asked the run to stop; summary and pictures show what there is.
     """
     say = (lambda text: None) if quiet else print
     start = clock.perf_counter()
-    simulation = Simulation(scene, device=device, precision=precision)
+    simulation = Simulation(scene, device=settings.device, precision=settings.precision)
+    settings = replace(settings, device=simulation.device.alias)
+    component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
     folder = writable(folder)
+    restart = Restart() if restart is None else restart
+    restart.begin(simulation, folder)
+    for name in (SUMMARY, *PICTURES):
+        (folder / name).unlink(missing_ok=True)  # a former run's would be taken for this one's
+    store(folder, file, scene, parameters, settings)
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )
-    end = scene.duration if until is None else until
-    component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
+    if simulation.steps:
+        say(f"goes on from step {simulation.steps}, t = {simulation.time:.6g} s")
+    end = scene.duration if settings.until is None else settings.until
     with file.blamed():
-        history = History(simulation, folder / "history.csv")
+        history = History(simulation, folder / "history.csv", restart.history)
     progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
     observers = [history, progress, *(watch(simulation) for watch in watching)]
-    begin, error = clock.perf_counter(), None
+    begin, error, stop = clock.perf_counter(), None, None
     try:
-        with file.blamed():
-            simulation.run(until=end, observers=observers)
+        with file.blamed(), restart.watching(simulation, history, folder, settings) as checkpoints:
+            simulation.run(until=end, observers=[*observers, checkpoints])
             history.sample(simulation)
     except NonFiniteError as failure:
         error = str(failure)
+    except StoppedError as asked:
+        stop = asked
     finally:
         for observer in observers:
             observer.close()
-    wall_time = clock.perf_counter() - begin
+    wall_time = clock.perf_counter() - begin + restart.wall_time
     checks: list[Check] = []
     finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
     try:
@@ -81,28 +101,29 @@ def run(
             )
             checks = file.checks(outcome)
     finally:  # the run keeps its summary when its checks fail to work
-        summary = summarise(simulation, parameters, checks, wall_time, __version__, error)
-        write_json(folder / "summary.json", summary)
-    pictures = []
-    if plot_history(simulation, history, folder / "history.png"):
-        pictures.append("history.png")
+        summary = summarise(simulation, parameters, checks, wall_time, __version__, error, stop is not None)
+        write_json(folder / SUMMARY, summary)
+    drawn = [plot_history(simulation, history, folder / PICTURES[0])]
     if error is None:
-        plot_field(simulation, folder / "field.png")
-        pictures.append("field.png")
-        if plot_surface(simulation, folder / "surface.png"):
-            pictures.append("surface.png")
+        plot_field(simulation, folder / PICTURES[1])
+        drawn += [True, plot_surface(simulation, folder / PICTURES[2])]
+    pictures = [name for name, there in zip(PICTURES, drawn, strict=False) if there]
     say(
         f"{simulation.steps} steps to t = {simulation.time:.6g} s in {wall_time:.1f} s, "
         f"{summary['node_steps_per_second']:.3g} node-steps/s"
     )
     if error:
         print(f"warpsph: {error}", file=sys.stderr)
-    elif not finished:
+    elif not finished and stop is None:
         say(f"checks skipped: they need the whole duration of {scene.duration:g} s")
     passed = error is None and all(check.passed for check in checks)
     if checks and not (quiet and passed):
         print(table(checks))
-    say(f"results in {folder}/: summary.json, history.csv, {', '.join(pictures)}")
+    say(f"results in {folder}/: {', '.join([SUMMARY, 'history.csv', 'scene.toml', *pictures])}")
+    if settings.frames:
+        say(f"all times on one sheet: warpsph plot {folder}")
+    if stop is not None:
+        raise stop
     return passed
 
 

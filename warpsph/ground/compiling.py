@@ -1,13 +1,32 @@
 """Compiling and loading kernels before they are needed, several at a time."""
 
 import inspect
+import sys
+import tempfile
 from collections.abc import Iterable
 
 import warp as wp
 
 
 def load_kernels(kernels: Iterable[wp.Kernel], device: wp.Device) -> None:
-    """Compile the kernels (or fetch them from Warp's cache) side by side, so that no step has to wait for them."""
+    """Compile the kernels (or fetch them from Warp's cache) side by side, so that no step has to wait for them.
+
+    A cache that has them all need not be writable; where one is missing and can not be stored, another is used.
+    """
     modules = list({kernel.module: None for kernel in kernels})
     workers = {"max_workers": None} if "max_workers" in inspect.signature(wp.force_load).parameters else {}
-    wp.force_load(device=device, modules=modules, **workers)
+    try:
+        wp.force_load(device=device, modules=modules, **workers)
+    except OSError as error:
+        use_temporary_cache(error)
+        wp.force_load(device=device, modules=modules, **workers)
+
+
+def use_temporary_cache(error: OSError) -> None:
+    """Make Warp keep this run's kernels in a temporary folder, and say why."""
+    folder = wp.config.kernel_cache_dir = tempfile.mkdtemp(prefix="warpsph-kernels-")
+    print(
+        f"warpsph: Warp's kernel cache can not be written ({error}); using {folder} for this run. "
+        f"Set WARP_CACHE_PATH to a writable folder to keep compiled kernels.",
+        file=sys.stderr,
+    )

@@ -1,6 +1,7 @@
 """Step 14 with volumes from the cells: nodes move, and densities follow from where they are.
 
-A cell's mass is constant, so its density is that mass over its volume, and a node's follows from the mean volume of
+A cell's mass is constant, so its density is that mass over its volume, and a node's follows from the mean
+volume of
 its cells. Integrating dρ/dt = −ρ tr d, as published, drifts where the gradient at a node is one-sided: at a free
 edge in strong shear by tens of per cent.
 """
@@ -28,7 +29,9 @@ class CellMotion(Motion):
         support, skin, reference_density, continuum, precision, device: as for `Motion`.
     """
 
-    def __init__(self, lattice: Lattice, ratio: float, support, skin, reference_density, continuum, precision, device):
+    def __init__(
+        self, lattice: Lattice, ratio: float, support, skin, reference_density, continuum, precision, device
+    ):
         super().__init__(len(lattice.nodes), support, skin, reference_density, continuum, precision, device)
         self._of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
         self._initial_volume = wp.array(lattice.cell_volumes(), dtype=precision.real, device=device)

@@ -38,12 +38,11 @@ class CellTypes:
     """Warp side of the cells.
 
     Attributes:
-        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each), `frame` (∇ξ_a in row a), `squareness`.
+        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
         Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
-        gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes' values, of
-            ∇φ a share κ of the way to the node's corner, and of Σ_S s_S f_S. κ is cut by the squareness: in flat cells
-            the kernel, which is round, sees less of short waves than the corners do, and can not damp them.
+        gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes'
+            values, of ∇φ a share κ of the way to the node's corner, of Σ_S s_S f_S, and of the frames.
     """
 
     Cell: type
@@ -66,7 +65,11 @@ def corner_sides(continuum: Continuum, precision: Precision):
 def frame_function(continuum: Continuum, precision: Precision) -> wp.Function:
     """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
     dim, real = continuum.dim, precision.real
-    tensor, determinant, inverse = precision.mat(dim, dim), determinant_of(dim, precision), inverse_of(dim, precision)
+    tensor, determinant, inverse = (
+        precision.mat(dim, dim),
+        determinant_of(dim, precision),
+        inverse_of(dim, precision),
+    )
 
     @wp.func
     def frame_of(edges: tensor):
@@ -96,29 +99,18 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     phi_modes, position_modes = precision.mat(types.size, columns), precision.mat(dim, columns)
     side = corner_sides(continuum, precision)
     sign = precision.mat(corners, columns)(*alternating.ravel().tolist())
-    determinant, frame_of = determinant_of(dim, precision), frame_function(continuum, precision)
+    frame_of = frame_function(continuum, precision)
 
     @wp.struct
     class Cell:
         gradient: phi_gradient
         modes: phi_modes
         frame: tensor
-        squareness: real
 
     @wp.struct
     class Cells:
         cell: wp.array(dtype=Cell)
         of_node: wp.array2d(dtype=wp.int32)
-
-    @wp.func
-    def squareness_of(frame: tensor, volume: real):
-        """Square of the least height of a cell over the edge of a cube as large; 1 of a cube, 0 of a folded cell."""
-        per_height2 = real(0.0)
-        for a in range(wp.static(dim)):
-            per_height2 = wp.max(per_height2, wp.length_sq(frame[a]))
-        if per_height2 <= real(0.0):
-            return real(0.0)
-        return wp.min(real(1.0), wp.pow(volume, real(wp.static(-2.0 / dim))) / per_height2)
 
     @wp.func
     def describe(a: int, auxiliary: AuxiliaryNodes, nodes: wp.array(dtype=Point)):
@@ -133,13 +125,12 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
             bends += wp.outer(point.x, sign[k])
         share, twice = real(wp.static(1.0 / corners)), real(wp.static(2.0 / corners))
         cell.frame = frame_of(twice * edges)
-        cell.squareness = squareness_of(cell.frame, determinant(twice * edges))
         cell.modes = share * (cell.modes - (twice * slopes) * (cell.frame * bends))
         return share * mean, cell
 
     @wp.func
     def beyond_middle(modes: phi_modes, end: types.vector, share: real):
-        """What ∂f/∂ξ_a has beyond that in the middle at this share of the way to a corner along each other axis."""
+        """A share of what ∂f/∂ξ_a at a corner has beyond that in the middle, for each other axis."""
         part = phi_gradient()
         for s in range(wp.static(number)):
             for a in range(wp.static(dim)):
@@ -164,8 +155,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                 frame += cells.cell[a].frame
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
-                    near = share * cells.cell[a].squareness
-                    gradient += beyond_middle(modes, side[k], near) * cells.cell[a].frame
+                    gradient += beyond_middle(modes, side[k], share) * cells.cell[a].frame
                     checkerboard += modes * sign[k]
         return value / found, gradient / found, checkerboard / found, frame / found
 

@@ -142,7 +142,9 @@ def apply_kernel(continuum: Continuum, precision: Precision, conditions: Conditi
         i = wp.tid()
         phi = apply(i, nodes.point[i].phi, table)
         nodes.point[i].phi = phi
-        if not wp.isfinite(wp.dot(phi, phi)) and health[0] < 0:
+        u = nodes.displacement[i]
+        # A NaN position is nobody's neighbour, so that it would never show in φ.
+        if not wp.isfinite(wp.dot(phi, phi) + wp.dot(u, u)) and health[0] < 0:
             health[0] = i
             health[1] = step
 

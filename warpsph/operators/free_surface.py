@@ -3,8 +3,8 @@
 Tractions vanish on every face that a surface node lies on: σ ← P σ P, P the projector onto the directions that
 lie in all of its faces. On a smooth surface P = 1 − n n; along the edge of a solid P = e e; at a corner, of two
 edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept. Where tractions vanish by elastic
-unloading, strains along the m directions taken out do it, and with them σ ← P σ P − λ/(m λ + 2G) tr(σ − P σ) (P + the
-direction out of plane).
+unloading, strains along the m directions taken out do it, and with them σ ← P σ P − λ/(m λ + 2G) tr(σ − P σ)
+(P + the direction out of plane).
 
 At the end of a wall a velocity condition beats the traction condition: only the directions that nobody moves are
 freed, so there n stands for its part along them. Without that a slope's toe would carry the full overburden on its
@@ -110,7 +110,12 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
     """The conditions' table and function, with the free surface: P of each candidate after all else."""
     phi, walls = unknowns(continuum, precision), condition_types(continuum, precision)
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    kin, types, dim, real = kinematics(continuum, precision), node_types(continuum, precision), continuum.dim, precision.real
+    kin, types, dim, real = (
+        kinematics(continuum, precision),
+        node_types(continuum, precision),
+        continuum.dim,
+        precision.real,
+    )
     apply_walls, transform, spherical = walls.apply, kin.transform, kin.spherical
     stress, tensor = types.stress, types.tensor
 

@@ -1,10 +1,10 @@
 """A bulk viscosity that acts at fronts only: it takes the ringing of a second-order scheme off a shock.
 
 In a cell with the volumetric rate e = tr L, the pressure −q = −ρ ν ψ e with ν = χ (1 − C²) Δ²/(4Δt) damps the
-shortest compression wave by the factor 1 − χ (1 − C²) ψ a step, on top of Lax and Wendroff's 1 − 2C². How rough e is,
-r = |e − mean of the corners' tr L|/largest of all, decides: ψ = min(1, (r/0.3)²). r is 1/2 at a jump and about
-(k Δ)² in a wave, so a wave resolved by 40 cells is damped 10⁻⁴ times as much as a jump. Shear is left alone: a shear
-band is as sharp as a shock, and a viscosity there would carry load.
+shortest compression wave by the factor 1 − χ (1 − C²) ψ a step, on top of Lax and Wendroff's 1 − 2C². How rough e
+is, r = |e − mean of the corners' tr L|/largest of all, decides: ψ = min(1, (r/0.3)²). r is 1/2 at a jump and about
+(k Δ)² in a wave, so a wave resolved by 40 cells is damped 10⁻⁴ times as much as a jump. Shear is left alone: a
+shear band is as sharp as a shock, and a viscosity there would carry load.
 """
 
 from functools import cache

@@ -1,8 +1,8 @@
 """How much closer than at the start the nodes are, as far as the time step can feel it.
 
-Kernels are stretched and turned with the cells, so in a cell's own coordinates ξ every gradient is a lattice's, whose
-waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 3). In space that gradient grows with ∇ξ, at most by its largest
-singular value: Δx is the least singular value of the cell's edges ∂x/∂ξ, the least distance across it in any direction.
+Kernels are stretched and turned with the cells, so in a cell's own coordinates ξ every gradient is a lattice's,
+whose waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 3). In space that gradient grows with ∇ξ, at most by
+its largest singular value: Δx is the least singular value of the cell's edges ∂x/∂ξ, the least distance across it.
 """
 
 from functools import cache

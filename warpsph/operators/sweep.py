@@ -28,12 +28,13 @@ class Sweep:
     """The functions of one pass.
 
     Attributes:
-        collect: (target index, its x and metric M, base value, pair list, source points) → Sums. ξ² = |M r|²: M = 1/h for
+        collect: (target index, its x and metric M, base value, pair list, source points) → Sums. ξ² = |M r|²:
+            M = 1/h for
             a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes MᵀM out of ∇W again.
         value: Sums → Shepard value; the base value where no neighbour is left.
         round_metric: h → 1/h.
-        cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in adaptive
-            SPH, Owen et al. 1998); 1/h where they have folded.
+        cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in
+            adaptive SPH, Owen et al. 1998); 1/h where they have folded.
         gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
     """
 
@@ -69,7 +70,9 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         g_phi: phi_gradient  # Σ V (φ_J − base) ⊗ ∇W
 
     @wp.func
-    def collect(target: int, x: vector, metric: tensor, base: phi, pairs: PairList, sources: wp.array(dtype=Point)):
+    def collect(
+        target: int, x: vector, metric: tensor, base: phi, pairs: PairList, sources: wp.array(dtype=Point)
+    ):
         sums = Sums()
         sums.base = base
         for k in range(pairs.start[target], pairs.start[target + 1]):

@@ -4,9 +4,10 @@ At a constrained node, applying the conditions at time t means
 
     v ← P v + Σ_k a_k f_k(t),        σ ← Π σ,
 
-with P the projector onto the directions whose velocity is free and Π a projector onto the stresses whose prescribed
-tractions vanish, orthogonal in the Frobenius norm (tractions are cut off, as published) or in that of the elastic
-energy (they are released by elastic unloading: Π = 1 − Dₑ Nᵀ (N Dₑ Nᵀ)⁻¹ N, N the tractions' rows). Where conditions meet (METHOD section 5):
+with P the projector onto the directions whose velocity is free and Π a projector onto the stresses whose
+prescribed tractions vanish, orthogonal in the Frobenius norm (tractions are cut off, as published) or in that of
+the elastic energy (they go by elastic unloading: Π = 1 − Dₑ Nᵀ (N Dₑ Nᵀ)⁻¹ N, N the tractions' rows). Where
+conditions meet (METHOD section 5):
 
 - a velocity condition beats a traction condition: a free edge frees only the directions that nobody moves;
 - a wall without friction keeps its zero shear at its ends as well, as a plane of symmetry does;
@@ -65,8 +66,8 @@ def resolve(
     Args:
         lattice: the lattice.
         conditions: the conditions.
-        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then vanish by elastic unloading. They
-            are cut off, all other components kept, unless it is given.
+        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then vanish by elastic
+            unloading. They are cut off, all other components kept, unless it is given.
     """
     dim, continuum = lattice.dim, lattice.continuum
     groups = _groups(lattice, conditions)

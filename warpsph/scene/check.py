@@ -22,6 +22,10 @@ class Check:
         bound: largest allowed error.
         relative: whether the error is |value − reference| / |reference|; the plain difference if not.
         bound_below: largest allowed error of a value below the reference; `bound` unless given.
+
+    >>> check = Check("limit_load", value=91.5e3, reference=89.06e3, unit="N", bound=0.03)
+    >>> round(check.error, 4), check.passed
+    (0.0274, True)
     """
 
     name: str

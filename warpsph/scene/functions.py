@@ -48,7 +48,11 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Pulse:
-    """`value` for 0 ≤ t ≤ `duration` [s], then 0. The end is met to a relative 1e-9, whatever the step."""
+    """`value` for 0 ≤ t ≤ `duration` [s], then 0. The end is met to a relative 1e-9, whatever the step.
+
+    >>> Pulse(1.0, duration=0.1)(0.1), Pulse(1.0, duration=0.1)(0.11)
+    (1.0, 0.0)
+    """
 
     value: float
     duration: float
@@ -63,7 +67,11 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Table:
-    """Linear interpolation between (time [s], value) pairs; constant outside them."""
+    """Linear interpolation between (time [s], value) pairs; constant outside them.
+
+    >>> Table(times=(0.0, 1.0), values=(0.0, 4.0))(0.25)
+    1.0
+    """
 
     times: tuple[float, ...]
     values: tuple[float, ...]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -50,16 +51,32 @@ class Lattice:
 
     def cell_volumes(self) -> np.ndarray:
         """Volume of each cell [mᵈ], shape (m,): the Jacobian at its centre (exact for a quadrilateral)."""
-        return np.linalg.det(self._cell_jacobians())
+        return np.linalg.det(self.cell_jacobians())
 
-    def _cell_jacobians(self) -> np.ndarray:
-        corners = self.nodes[self.cells]
-        bits = np.array(list(itertools.product((0, 1), repeat=self.dim)))
-        columns = [
-            corners[:, bits[:, axis] == 1].mean(axis=1) - corners[:, bits[:, axis] == 0].mean(axis=1)
-            for axis in range(self.dim)
-        ]
-        return np.stack(columns, axis=2)
+    def cell_jacobians(self) -> np.ndarray:
+        """Mean edge vectors of each cell along the axes of the grid [m], as columns, shape (m, d, d)."""
+        corners = [self.nodes[corner] for corner in self.cells.T]
+        sides = 2.0 * np.array(list(itertools.product((0, 1), repeat=self.dim))) - 1.0
+        columns = [sum(s * x for s, x in zip(side, corners, strict=True)) for side in sides.T]
+        return np.stack(columns, axis=2) / 2.0 ** (self.dim - 1)
+
+    @cached_property
+    def _inverse_jacobians(self) -> np.ndarray:
+        return np.linalg.inv(self.cell_jacobians())
+
+    def cell_gradients(self, values: np.ndarray) -> np.ndarray:
+        """∂f_i/∂x_j at the centre of each cell, shape (m, d, d), of a vector field (n, d) at the nodes."""
+        return self.with_nodes(values).cell_jacobians() @ self._inverse_jacobians
+
+    def at_centres(self, values: np.ndarray) -> np.ndarray:
+        """Mean of node values (n, …) over the corners of each cell, shape (m, …)."""
+        return sum(values[corner] for corner in self.cells.T) / self.cells.shape[1]
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Mean of cell values (m, k) over the cells around each node, shape (n, k)."""
+        owner, corners, n = self.cells.ravel(), self.cells.shape[1], len(self.nodes)
+        sums = [np.bincount(owner, np.repeat(column, corners), n) for column in values.T]
+        return np.stack(sums, axis=1) / np.bincount(owner, minlength=n)[:, None]
 
     def largest_edge(self) -> float:
         """Length of the longest cell edge [m]."""
@@ -70,7 +87,7 @@ class Lattice:
 
     def smallest_edge(self) -> float:
         """Shortest distance across a cell between the middles of opposite faces [m]."""
-        return float(np.linalg.norm(self._cell_jacobians(), axis=1).min())
+        return float(np.linalg.norm(self.cell_jacobians(), axis=1).min())
 
     def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.

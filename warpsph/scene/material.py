@@ -19,6 +19,15 @@ class Elastic:
         young_modulus: E [Pa], > 0.
         poisson_ratio: ν [-], in (−1, 0.5); unused by a bar, which is in uniaxial stress.
         density: ρ [kg/m³], > 0.
+
+    Raises:
+        SceneError: a parameter is not allowed.
+
+    >>> Elastic(young_modulus=8e7, density=2000.0).wave_speed(dim=1)
+    200.0
+    >>> Elastic(young_modulus=8e7, density=-1.0)
+    Traceback (most recent call last):
+    warpsph.errors.SceneError: density = -1.0 is not allowed: it must be a finite number above 0.0
     """
 
     young_modulus: float
@@ -62,8 +71,12 @@ class Elastic:
         return math.sqrt(self.shear_modulus / self.density)
 
     def relaxation_modulus(self, dim: int) -> float:
-        """−dq/dε̄ at fixed strain [Pa]: how fast viscoplastic flow relaxes q; E in a bar, 3G otherwise."""
+        """−dq/dε̄ at fixed strain [Pa]: how fast inelastic flow relaxes q; E in a bar, 3G otherwise."""
         return self.young_modulus if dim == 1 else 3.0 * self.shear_modulus
+
+    def flow_rate(self, dim: int) -> float:
+        """Fastest rate at which inelastic flow relaxes the stress in slow loading [1/s]; 0 where nothing flows."""
+        return 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +89,15 @@ class PerzynaVonMises(Elastic):
         exponent: N [-], ≥ 1.
         hardening: H = dY/dε̄ [Pa]; negative softens.
         residual_ratio: r [-], in (0, 1]: softening ends at Y = r Y0 (the paper lets Y reach zero).
+
+    Raises:
+        SceneError: a parameter is not allowed.
+
+    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ; docs/method.md, section 1.
+
+    >>> soil = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
+    >>> soil.flow_rate(dim=1)  # E γ N/Y0 in a bar
+    400.0
     """
 
     fluidity: float
@@ -92,6 +114,7 @@ class PerzynaVonMises(Elastic):
         self._check("hardening", above=-self.young_modulus)
         self._check("residual_ratio", above=0.0, at_most=1.0)
 
-    def smallest_yield_size(self) -> float:
-        """The least Y that can occur [Pa]."""
-        return self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
+    def flow_rate(self, dim: int) -> float:
+        """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""
+        smallest_yield_size = self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
+        return self.relaxation_modulus(dim) * self.fluidity * self.exponent / smallest_yield_size

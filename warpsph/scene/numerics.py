@@ -43,8 +43,8 @@ class Numerics:
         kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
         smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given.
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
-        velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the published
-            2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
+        velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the
+            published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
     """

@@ -23,6 +23,9 @@ class Parameter:
         meaning: one line.
         choices: the allowed values, if only some are.
         automatic: whether a number may also be `auto`.
+
+    >>> Parameter("spacing", 0.1, "m", "distance between nodes").parse("0.05")
+    0.05
     """
 
     name: str

@@ -37,6 +37,9 @@ class BodyForce:
     Args:
         acceleration: [m/s²], one component an axis.
         factor: a number or a function of time, e.g. `Ramp(1.0)`.
+
+    >>> BodyForce((0.0, -9.81), lambda t: 2.0 * t)(0.5)
+    array([ 0.  , -9.81])
     """
 
     acceleration: tuple[float, ...]
@@ -59,8 +62,8 @@ class Scene:
         shape: the body with its lattice.
         material: `Elastic` or `PerzynaVonMises`.
         duration: simulated time [s].
-        conditions: boundary conditions; an edge without one is free of traction (with a published velocity scheme it
-            keeps whatever traction it has).
+        conditions: boundary conditions; an edge without one is free of traction (with a published velocity
+            scheme it keeps whatever traction it has).
         free_surface: frees the edge that no condition moves of its tractions, as it moves and deforms; or None.
         body_force: uniform body force, or None.
         damping: mass-proportional damping c [1/s]: dv/dt = … − c v.
@@ -75,6 +78,17 @@ class Scene:
 
     Raises:
         SceneError: a field is not allowed; the message names it, its value and what is allowed.
+
+    >>> from warpsph import Box, Elastic, Fixed, edge
+    >>> scene = Scene(
+    ...     shape=Box(size=(1.0, 1.0), spacing=0.5),
+    ...     material=Elastic(young_modulus=1e6, density=2000.0),
+    ...     conditions=[Fixed(edge("bottom"))],
+    ...     velocity=lambda x, y: (0.1 * y, 0.0),
+    ...     duration=1.0,
+    ... )
+    >>> scene.boundary.nodes, scene.initial_velocity.shape
+    (array([0, 3, 6]), (9, 2))
     """
 
     shape: Shape

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from .lattice import Lattice
-from .validate import choice, field_of_position, vector
+from .validate import choice, field_of_position, index, vector
 
 
 class Selection:
@@ -29,10 +29,10 @@ class Selection:
         return np.ones(len(lattice.faces), dtype=bool)
 
     def __and__(self, other: Selection) -> Selection:
-        return Both(self, _selection(other))
+        return Both(self, other)
 
     def __or__(self, other: Selection) -> Selection:
-        return Either(self, _selection(other))
+        return Either(self, other)
 
     def __invert__(self) -> Selection:
         return Outside(self)
@@ -43,6 +43,10 @@ class edge(Selection):  # noqa: N801 - written as a word in scenes
     """The nodes of a named edge: left, right, bottom, top, in 3D also front and back; `boundary` is all.
 
     Names refer to the axes of the lattice before it was rotated or mapped.
+
+    >>> from warpsph import Box
+    >>> edge("left").nodes(Box((1.0,), 0.5).lattice())
+    array([ True, False, False])
     """
 
     name: str
@@ -65,6 +69,10 @@ class region(Selection):  # noqa: N801
 
     Args:
         lower, upper: opposite corners [m].
+
+    >>> from warpsph import Box
+    >>> region((0.4,), (1.0,)).nodes(Box((1.0,), 0.5).lattice())
+    array([False,  True,  True])
     """
 
     lower: tuple[float, ...]
@@ -91,6 +99,10 @@ class where(Selection):  # noqa: N801
     """The nodes where a function of the initial position, f(x, y, …) with arrays, is true.
 
     Coordinates are rounded to 12 digits of the body's extent, so that `x <= 0.3` holds on a node at 0.3.
+
+    >>> from warpsph import Box
+    >>> (where(lambda x: x > 0.4) & ~edge("right")).nodes(Box((1.0,), 0.5).lattice())
+    array([False,  True, False])
     """
 
     function: Callable
@@ -100,6 +112,26 @@ class where(Selection):  # noqa: N801
         decimals = 12 - int(np.ceil(np.log10(extent)))
         points = np.round(lattice.nodes, decimals)
         return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
+
+
+@dataclass(frozen=True, eq=False)
+class chosen(Selection):  # noqa: N801
+    """Nodes by their numbers in the lattice: what a `where` has found, in a stored scene."""
+
+    numbers: np.ndarray
+
+    def __post_init__(self):
+        numbers = np.asarray(self.numbers)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
+            raise SceneError("chosen.numbers", self.numbers, "it must be a sequence of whole numbers")
+        object.__setattr__(self, "numbers", numbers)
+
+    def nodes(self, lattice: Lattice) -> np.ndarray:
+        mask = np.zeros(len(lattice.nodes), dtype=bool)
+        for number in (self.numbers.min(initial=0), self.numbers.max(initial=0)):
+            index("chosen.numbers", number, below=len(mask))
+        mask[self.numbers] = True
+        return mask
 
 
 @dataclass(frozen=True)
@@ -117,6 +149,9 @@ class Both(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) & self.second.nodes(lattice)
 
@@ -131,6 +166,9 @@ class Either(Selection):
     first: Selection
     second: Selection
 
+    def __post_init__(self):
+        _selection(self.first), _selection(self.second)
+
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return self.first.nodes(lattice) | self.second.nodes(lattice)
 
@@ -143,6 +181,9 @@ class Outside(Selection):
     """Nodes not in the selection."""
 
     inner: Selection
+
+    def __post_init__(self):
+        _selection(self.inner)
 
     def nodes(self, lattice: Lattice) -> np.ndarray:
         return ~self.inner.nodes(lattice)

@@ -97,6 +97,9 @@ class Disc(Shape):
         radius: radius [m].
         spacing: Δx [m].
         centre: centre [m].
+
+    >>> len(Disc(radius=1.0, spacing=0.5).lattice().cells)
+    12
     """
 
     radius: float
@@ -165,12 +168,40 @@ class Mapped(Shape):
 
     def lattice(self) -> Lattice:
         start = self.shape.lattice()
-        lattice = start.with_nodes(field_of_position("mapped.function", self.function, start.nodes, start.dim))
-        if lattice.cell_volumes().min() <= 0.0:
-            raise SceneError(
-                "mapped.function", self.function, "it must keep every cell's volume positive (no folds)"
-            )
-        return lattice
+        nodes = field_of_position("mapped.function", self.function, start.nodes, start.dim)
+        return _unfolded(start.with_nodes(nodes), "mapped.function", self.function)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed(Shape):
+    """Another shape with its nodes at given places: what a mapping has made, in a stored scene.
+
+    Args:
+        shape: the shape whose cells these are.
+        nodes: positions [m], shape (n, d).
+    """
+
+    shape: Shape
+    nodes: np.ndarray
+
+    def __post_init__(self):
+        instance("Placed.shape", self.shape, Shape, "a shape")
+
+    def lattice(self) -> Lattice:
+        start = self.shape.lattice()
+        try:
+            nodes = np.array(self.nodes, dtype=float)
+        except (TypeError, ValueError):
+            nodes = np.empty(0)
+        if nodes.shape != start.nodes.shape or not np.isfinite(nodes).all():
+            raise SceneError("Placed.nodes", self.nodes, f"it must be finite numbers of shape {start.nodes.shape}")
+        return _unfolded(start.with_nodes(nodes), "Placed.nodes", self.nodes)
+
+
+def _unfolded(lattice: Lattice, field: str, value: object) -> Lattice:
+    if lattice.cell_volumes().min() <= 0.0:
+        raise SceneError(field, value, "it must keep every cell's volume positive (no folds)")
+    return lattice
 
 
 LARGEST_LATTICE = 10**9

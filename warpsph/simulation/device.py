@@ -10,6 +10,7 @@ import tempfile
 import warp as wp
 
 from ..errors import SceneError
+from ..ground.compiling import use_temporary_cache
 
 
 def start_warp() -> None:
@@ -22,14 +23,9 @@ def start_warp() -> None:
         with _without_driver_notice():
             wp.init()
     except OSError as error:
-        folder = tempfile.mkdtemp(prefix="warpsph-kernels-")
-        print(
-            f"warpsph: Warp's kernel cache can not be written ({error}); using {folder} for this run. "
-            f"Set WARP_CACHE_PATH to a writable folder to keep compiled kernels.",
-            file=sys.stderr,
-        )
-        wp.config.kernel_cache_dir = folder
-        wp.init()
+        use_temporary_cache(error)
+        with _without_driver_notice():
+            wp.init()
 
 
 @contextlib.contextmanager

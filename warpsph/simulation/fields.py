@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ground.materials import law
+from ..ground.precision import PRECISIONS
 from ..scene.dimension import Continuum
+from ..scene.lattice import Lattice
 from ..scene.material import PerzynaVonMises
+from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -55,23 +59,45 @@ def _yield_size(simulation) -> np.ndarray:
 
 def von_mises(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     """q = √(3 J₂) [Pa] of stored stresses (n, s); |σ| in a bar."""
-    return np.sqrt(1.5 * np.sum(_deviator(stress, continuum) ** 2, axis=(1, 2)))
+    mean, squares = mean_stress(stress, continuum), 0.0
+    for k, (i, j) in enumerate(continuum.pairs):
+        squares = squares + ((stress[:, k] - mean) ** 2 if i == j else 2.0 * stress[:, k] ** 2)
+    stressless = 3 - sum(i == j for i, j in continuum.pairs)  # directions, of a bar
+    return np.sqrt(1.5 * (squares + stressless * mean**2))
 
 
 def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     """tr σ/3 [Pa], tension positive; σ/3 in a bar."""
-    return np.trace(_tensor(stress, continuum), axis1=1, axis2=2) / 3.0
+    return sum(stress[:, k] for k, (i, j) in enumerate(continuum.pairs) if i == j) / 3.0
 
 
-def _tensor(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    full = np.zeros((len(stress), 3, 3))
-    for k, (i, j) in enumerate(continuum.pairs):
-        full[:, i, j] = full[:, j, i] = stress[:, k]
-    return full
+def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
+    """Green-Lagrange strain E = (H + Hᵀ + HᵀH)/2, H = ∂u/∂X, shape (n, s): the mean over a node's cells.
+
+    In the components and the order of the stored stresses; E33 of plane strain is zero.
+
+    Args:
+        lattice: the initial lattice.
+        displacement: of the nodes [m], shape (n, d).
+    """
+    H = lattice.cell_gradients(displacement)
+
+    def part(i: int, j: int) -> np.ndarray:
+        if max(i, j) >= lattice.dim:
+            return np.zeros(len(H))
+        return 0.5 * (H[:, i, j] + H[:, j, i] + sum(H[:, k, i] * H[:, k, j] for k in range(lattice.dim)))
+
+    return lattice.at_nodes(np.stack([part(i, j) for i, j in lattice.continuum.pairs], axis=1))
 
 
-def _deviator(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    return _tensor(stress, continuum) - mean_stress(stress, continuum)[:, None, None] * np.eye(3)
+def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
+    """Names of the components of a field: s12, e11, y, or xy of a tensor; none of a scalar."""
+    shape, axes = FIELDS[name].shape if name in FIELDS else "(n,)", continuum.axes
+    if shape == "(n, s)":
+        return tuple(("s" if name == "stress" else "e") + part[1:] for part in continuum.stress_components)
+    if shape == "(n, d)":
+        return axes
+    return tuple(a + b for a in axes for b in axes) if shape == "(n, d, d)" else ()
 
 
 FIELDS: dict[str, Field] = {
@@ -83,8 +109,11 @@ FIELDS: dict[str, Field] = {
     "mean_stress": Field(
         "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.lattice.continuum)
     ),
-    "equivalent_plastic_strain": Field(
-        "-", "(n,)", "equivalent viscoplastic strain ε̄", lambda s: s.history.numpy()[:, 0].copy(), _has_yield
+    "strain": Field(
+        "-",
+        "(n, s)",
+        "Green-Lagrange strain, components as of the stress",
+        lambda s: green_strain(s.lattice, s.nodes.displacement.numpy()),
     ),
     "yield_size": Field("Pa", "(n,)", "size of the yield surface Y", _yield_size, _has_yield),
     "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
@@ -115,3 +144,17 @@ FIELDS: dict[str, Field] = {
         lambda s: s.scene.material.density * s.lattice.node_volumes()[0],
     ),
 }
+
+
+def fields_of(scene: Scene) -> dict[str, Field]:
+    """The fields of a scene by name: those of `FIELDS` it has, and the internal variables of its material."""
+    return {name: field for name, field in FIELDS.items() if field.available(scene)} | internal_variables(scene)
+
+
+def internal_variables(scene: Scene) -> dict[str, Field]:
+    """What the nodes of a scene remember of their material, by name."""
+    history = law(scene.material, scene.lattice.continuum, PRECISIONS["float64"]).history
+    return {
+        name: Field(unit, "(n,)", meaning, lambda s, k=k: s.history.numpy()[:, k].copy())
+        for k, (name, unit, meaning) in enumerate(history)
+    }

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import math
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +20,30 @@ class History:
 
     Args:
         simulation: the simulation; sampled at once, then whenever an interval has passed.
-        path: CSV file to write, row by row, so that a run that dies leaves what it had.
+        path: CSV file to write, row by row, so that a run that dies leaves what it had. A disk that is full does
+            not end the run: what could not be written waits for the next row.
+        state: what `state` gave, to go on from there; `simulation` is then not sampled at once.
 
     Attributes:
         names: column names, `step` and `time` first.
         units: their units.
+
+    >>> from warpsph import Box, Elastic, NodeValue, Output, Probe, Scene, Simulation
+    >>> scene = Scene(
+    ...     shape=Box((1.0,), 0.1),
+    ...     material=Elastic(young_modulus=8e7, density=2000.0),
+    ...     velocity=lambda x: 0.5,
+    ...     duration=1e-3,
+    ...     output=Output(interval=0.0, probes=(Probe("u", "m", NodeValue("displacement", (1.0,))),)),
+    ... )
+    >>> simulation = Simulation(scene, device="cpu")
+    >>> history = History(simulation)
+    >>> simulation.run(observers=[history])
+    >>> history["time"].size == simulation.steps + 1, round(float(history["u"][-1]), 9)
+    (True, 0.0005)
     """
 
-    def __init__(self, simulation: Simulation, path: Path | None = None):
+    def __init__(self, simulation: Simulation, path: Path | None = None, state: Mapping | None = None):
         output, duration = simulation.scene.output, simulation.scene.duration
         self._probes = output.probes
         self._interval = duration / 400.0 if output.interval is None else output.interval
@@ -31,11 +51,12 @@ class History:
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
         self._rows: list[list[float]] = []
         self._next = 0.0
-        self._file = path.open("w", newline="", encoding="utf-8") if path else None
-        self._writer = None if self._file is None else csv.writer(self._file)
-        if self._writer:
-            self._writer.writerow(f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True))
-        self.observe(simulation)
+        self._file = None if path is None else _Rows(path)
+        self._write([f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)])
+        if state is None:
+            self.observe(simulation)
+        else:
+            self._restore(state)
 
     def observe(self, simulation: Simulation) -> None:
         """Sample when the interval has passed."""
@@ -51,9 +72,21 @@ class History:
             return
         row = [simulation.steps, simulation.time, *(probe.function(simulation) for probe in self._probes)]
         self._rows.append(row)
-        if self._writer:
-            self._writer.writerow([row[0], *(repr(float(value)) for value in row[1:])])
-            self._file.flush()
+        self._write(_texts(row))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All that is needed to go on: the rows, and when to sample next [s]."""
+        rows = np.array(self._rows, dtype=float).reshape(-1, len(self.names))
+        return {"rows": rows, "next": np.array(self._next)}
+
+    def _restore(self, state: Mapping[str, np.ndarray]) -> None:
+        self._next = float(state["next"])
+        self._rows = [[int(row[0]), *row[1:]] for row in state["rows"].tolist()]
+        self._write(*map(_texts, self._rows))
+
+    def _write(self, *rows: list) -> None:
+        if self._file:
+            self._file.write(rows)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """All samples of one column."""
@@ -68,3 +101,58 @@ class History:
         """Close the file."""
         if self._file:
             self._file.close()
+
+
+def _texts(row: list[float]) -> list:
+    return [row[0], *(repr(float(value)) for value in row[1:])]
+
+
+class _Rows:
+    """A CSV file that always ends with a whole row, also where the disk fills up."""
+
+    def __init__(self, path: Path):
+        self._path, self._waiting, self._end, self._failed = path, b"", 0, False
+        self._file = path.open("wb", buffering=0)
+
+    def write(self, rows: tuple[list, ...]) -> None:
+        """Add rows; those that the disk does not take are kept for the next time."""
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows(rows)
+        self._waiting += text.getvalue().encode("utf-8")
+        self._flush()
+
+    def _flush(self) -> None:
+        left = self._waiting
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.truncate(self._end)
+                self._file.seek(self._end)
+            if not self._failed:
+                print(f"warpsph: {self._path} can not be written now ({error.strerror})", file=sys.stderr)
+            self._failed = True
+        else:
+            self._end, self._waiting = self._end + len(self._waiting), b""
+
+    def close(self) -> None:
+        """Try once more what is waiting, and say so when it is lost."""
+        self._flush()
+        if self._waiting:
+            print(f"warpsph: {self._path} lacks its last rows: the disk did not take them", file=sys.stderr)
+        self._file.close()
+
+
+def read_history(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Columns and units of a history file by name; an unfinished last line is left out.
+
+    Raises:
+        OSError: there is no such file.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    names = [cell.rsplit(" [", 1)[0] for cell in header]
+    units = [cell.rsplit(" [", 1)[-1].rstrip("]") for cell in header]
+    table = np.array([row for row in rows if len(row) == len(header)], dtype=float).reshape(-1, len(header))
+    return dict(zip(names, table.T, strict=True)), dict(zip(names, units, strict=True))

@@ -31,7 +31,14 @@ def checkerboard(lattice: Lattice, values: np.ndarray) -> np.ndarray:
 
 
 def checkerboard_amplitude(lattice: Lattice, values: np.ndarray) -> float:
-    """RMS of `checkerboard` over the interior nodes: A for a checkerboard ±A, 0 for a bilinear field."""
+    """RMS of `checkerboard` over the interior nodes: A for a checkerboard ±A, 0 for a bilinear field.
+
+    >>> from warpsph import Box
+    >>> lattice = Box((3.0, 3.0), 1.0).lattice()
+    >>> x, y = lattice.nodes.T
+    >>> round(checkerboard_amplitude(lattice, 0.5 * (-1.0) ** (x + y) + 7.0 * x * y), 12)
+    0.5
+    """
     return float(np.sqrt(np.mean(checkerboard(lattice, values) ** 2)))
 
 
@@ -55,6 +62,15 @@ def growth_rate(time: np.ndarray, amplitude: np.ndarray, low: float, high: float
     """Rate s [1/s] of A ∝ exp(s t), fitted (least squares of ln A) from where A last left `low` to `high`.
 
     An amplitude that never reaches `high` is fitted over its second half, where the start's transient is over.
+
+    Args:
+        time: [s], shape (k,), rising.
+        amplitude: A > 0, shape (k,).
+        low, high: between which amplitudes.
+
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> round(growth_rate(t, 1e-3 * np.exp(5.0 * t), low=2e-3, high=0.1), 9)
+    5.0
     """
     time, amplitude = np.asarray(time), np.asarray(amplitude)
     above = np.flatnonzero(amplitude >= high)
@@ -67,7 +83,19 @@ def growth_rate(time: np.ndarray, amplitude: np.ndarray, low: float, high: float
 
 
 class Sampler:
-    """Values of a node field anywhere in a plane body, linear on the triangles of `split_cells`."""
+    """Values of a node field anywhere in a plane body, linear on the triangles of `split_cells`.
+
+    Args:
+        points: positions of the nodes [m], shape (n, 2).
+        cells: their cells, shape (m, 4).
+        values: at the nodes, shape (n,).
+
+    >>> from warpsph import Box
+    >>> lattice = Box((1.0, 1.0), 0.5).lattice()
+    >>> x, y = lattice.nodes.T
+    >>> Sampler(lattice.nodes, lattice.cells, x + 2.0 * y)(np.array([[0.25, 0.5], [9.0, 9.0]]))
+    array([1.25, 0.  ])
+    """
 
     def __init__(self, points: np.ndarray, cells: np.ndarray, values: np.ndarray):
         from matplotlib.tri import LinearTriInterpolator, Triangulation  # slow to import, and only needed here
@@ -125,6 +153,11 @@ def fit_band(points: np.ndarray, strain: np.ndarray, share: float = 0.2) -> Band
         strain: ε̄ there, shape (n,).
         share: a node belongs to the band from this share of the strain's 99th percentile on; a single node at a
             footing's edge does not decide.
+
+    >>> x, y = np.meshgrid(np.arange(21.0), np.arange(21.0))
+    >>> points = np.stack([x.ravel(), y.ravel()], axis=1)
+    >>> round(fit_band(points, np.where(x == y, 1.0, 0.0).ravel()).angle, 6)
+    45.0
     """
     weight = np.where(strain >= share * np.percentile(strain, 99), strain, 0.0)
     weight = weight / weight.sum()

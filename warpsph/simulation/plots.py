@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from matplotlib.figure import Figure
 
 from ..scene.lattice import Lattice
 from ..scene.output import component
-from .fields import FIELDS
+from .fields import component_names, fields_of
+from .files import write_whole
 from .history import History
 from .measures import split_cells
 from .simulation import Simulation
@@ -35,11 +37,11 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
         label, value = output.curve_reference
         axes.axhline(value, color=BRIGHT, linestyle="--", linewidth=1.2, label=f"{label}: {value:.5g}")
         axes.legend(loc="best", frameon=False)
-    axes.set_xlabel(_label(x_name, history.unit(x_name)))
-    axes.set_ylabel(_label(y_name, history.unit(y_name)))
+    axes.set_xlabel(axis_label(x_name, history.unit(x_name)))
+    axes.set_ylabel(axis_label(y_name, history.unit(y_name)))
     axes.set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    save_picture(figure, path)
     return True
 
 
@@ -49,14 +51,19 @@ def plot_field(simulation: Simulation, path: Path) -> None:
     values = simulation.field(output.field).astype(float)
     name = output.field
     if values.ndim > 1:
-        name = f"{name} {_component(values, output.field, output.component, lattice.continuum)}"
+        name = f"{name} {component_names(output.field, lattice.continuum)[output.component]}"
         values = component("Output", values, output.component)
     position = simulation.field("position")
-    label = _label(name, FIELDS[output.field].unit)
+    label = axis_label(name, fields_of(simulation.scene)[output.field].unit)
     draw = {1: _line, 2: _cells, 3: _surface}[lattice.dim]
     figure = draw(position, values, lattice, label)
     figure.axes[0].set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    save_picture(figure, path)
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG, whole or not at all."""
+    write_whole(path, lambda file: figure.savefig(file, format="png", dpi=DOTS_PER_INCH, bbox_inches="tight"))
 
 
 def _line(position, values, lattice, label) -> Figure:
@@ -84,8 +91,18 @@ def colour_span(values: np.ndarray) -> tuple[float, float]:
 
     From zero on where all values are positive and come near it.
     """
-    low, high = np.percentile(values, [0.5, 99.5])
-    low = 0.0 if values.min() >= 0.0 and low < 0.2 * high else low
+    return span_of([percentiles(values)])
+
+
+def percentiles(values: np.ndarray) -> np.ndarray:
+    """The smallest value and the ends of the middle 99 %, shape (3,)."""
+    return np.percentile(values, [0.0, 0.5, 99.5])
+
+
+def span_of(several: Sequence[np.ndarray]) -> tuple[float, float]:
+    """The span of colours that shows several pictures, each given by its `percentiles`."""
+    smallest, low, high = np.min(several, axis=0)[0], np.min(several, axis=0)[1], np.max(several, axis=0)[2]
+    low = 0.0 if smallest >= 0.0 and low < 0.2 * high else low
     return float(low), float(high if high > low else low + 1.0)
 
 
@@ -160,12 +177,5 @@ def _figure(size):
     return figure, figure.add_subplot()
 
 
-def _label(name: str, unit: str) -> str:
+def axis_label(name: str, unit: str) -> str:
     return f"{name.replace('_', ' ')} [{unit}]"
-
-
-def _component(values: np.ndarray, field: str, which: int, continuum) -> str:
-    """Name of a component: s12, y, or xy of a tensor counted row by row."""
-    if field == "stress":
-        return continuum.stress_components[which]
-    return "".join(continuum.axes[k] for k in np.unravel_index(which, values.shape[1:]))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from typing import Protocol
 
 import numpy as np
@@ -14,9 +15,11 @@ from ..scene.scene import Scene
 from ..scene.validate import instance, number, vector
 from ..step.step import Stepper
 from .device import choose_device
-from .fields import FIELDS
-from .time_step import ROUNDING, divide, time_step_limit
+from .fields import fields_of
+from .state import arrays, numbers, restore
+from .time_step import ROUNDING, Leg, divide, time_step_limit
 
+COUNTERS = ("time", "steps", "wall_time", "shortest_step", "longest_step")
 # A step that has become too long is shortened by a little more than it must be, so that it is not done every time.
 HEADROOM = 0.95
 
@@ -61,6 +64,7 @@ class Simulation:
         self.history, self.conditions = self._stepper.history, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
+        self._leg: Leg | None = None
 
     @property
     def time_step_limit(self) -> float:
@@ -74,7 +78,7 @@ class Simulation:
             time_step: Δt [s]; `time_step_limit` unless given, which it must not exceed.
 
         Raises:
-            NonFiniteError: velocity or stress stopped being finite.
+            NonFiniteError: velocity, stress or displacement stopped being finite.
         """
         dt = self.time_step_limit
         if time_step is not None:
@@ -84,26 +88,32 @@ class Simulation:
     def run(self, until: float | None = None, observers: Iterable[Observer] = ()) -> None:
         """Advance in equal steps until a time, telling the observers after every step.
 
+        A run that was stopped on its way, or restored there, goes on in the steps it had.
+
         Args:
             until: simulated time [s]; the scene's duration unless given.
             observers: told after every step.
 
         Raises:
-            NonFiniteError: velocity or stress stopped being finite; what the observers have stays theirs.
+            NonFiniteError: velocity, stress or displacement stopped being finite; observers keep what they have.
         """
         end = self.scene.duration if until is None else number("until", until, at_least=self.time)
         observers = tuple(observers)
         if end == self.time:
             return
-        start, k, (steps, dt) = self.time, 0, divide(end - self.time, self.time_step_limit)
-        while k < steps:
-            self._advance(dt)
-            k += 1
-            self.time = start + (end - start) * (k / steps)
+        leg = self._leg
+        if leg is None or leg.end != end or leg.time_after(self.steps) != self.time:
+            leg = self._leg = self._leg_to(end, self.time_step_limit)
+        while self.steps < leg.first + leg.steps:
+            self._advance(leg.time_step)
+            self.time = leg.time_after(self.steps)
+            if leg.time_step > self.time_step_limit * (1.0 + ROUNDING) and self.time < end:
+                leg = self._leg = self._leg_to(end, HEADROOM * self.time_step_limit)
             for observer in observers:
                 observer.observe(self)
-            if dt > self.time_step_limit * (1.0 + ROUNDING) and k < steps:
-                start, k, (steps, dt) = self.time, 0, divide(end - self.time, HEADROOM * self.time_step_limit)
+
+    def _leg_to(self, end: float, limit: float) -> Leg:
+        return Leg(self.time, end, divide(end - self.time, limit)[0], self.steps)
 
     def _advance(self, dt: float) -> None:
         begin = clock.perf_counter()
@@ -118,23 +128,38 @@ class Simulation:
             node, step = bad
             raise NonFiniteError(step, self.time, node, self.lattice.nodes[node])
 
+    def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:
+        """All that the next steps depend on: arrays and numbers by name; see `restore`."""
+        own = {name: getattr(self, name) for name in COUNTERS}
+        leg = None if self._leg is None else asdict(self._leg)
+        return arrays(self._stepper), {**own, "leg": leg, "stepper": numbers(self._stepper)}
+
+    def restore(self, state: Mapping[str, np.ndarray], values: Mapping[str, object]) -> None:
+        """Go back to what `state` gave, in this simulation or in another one of the same scene and precision.
+
+        Raises:
+            KeyError: the state is of another scene.
+        """
+        restore(self._stepper, state, values["stepper"])
+        for name in COUNTERS:
+            setattr(self, name, values[name])
+        self._leg = None if values["leg"] is None else Leg(**values["leg"])
+
     def field(self, name: str) -> np.ndarray:
         """A copy of a node field as a NumPy array; see `fields` for the names.
 
         Raises:
             SceneError: this scene has no field of that name.
         """
-        names = [key for key, value in FIELDS.items() if value.available(self.scene)]
-        if name not in names:
-            raise SceneError("field", name, one_of(names, name))
-        return FIELDS[name].read(self)
+        fields = fields_of(self.scene)
+        if name not in fields:
+            raise SceneError("field", name, one_of(fields, name))
+        return fields[name].read(self)
 
     def fields(self) -> dict[str, str]:
         """The fields of this scene: name → "shape [unit] meaning"."""
         return {
-            name: f"{field.shape} [{field.unit}] {field.meaning}"
-            for name, field in FIELDS.items()
-            if field.available(self.scene)
+            name: f"{field.shape} [{field.unit}] {field.meaning}" for name, field in fields_of(self.scene).items()
         }
 
     def nearest_node(self, point: Iterable[float]) -> int:

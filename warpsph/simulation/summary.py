@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import warp as wp
 
 from ..scene.check import Check
+from .files import write_whole
 from .simulation import Simulation
 
 
@@ -21,6 +21,7 @@ def summarise(
     wall_time: float,
     version: str,
     error: str | None = None,
+    stopped: bool = False,
 ) -> dict:
     """What `summary.json` says.
 
@@ -30,7 +31,8 @@ def summarise(
         checks: its checks.
         wall_time: seconds of the whole run with its observers, without compilation.
         version: of warpsph.
-        error: why the run stopped early, or None.
+        error: why the run broke down, or None.
+        stopped: whether it was asked to stop on its way.
     """
     stepped = simulation.steps > 0
     rate = len(simulation.lattice.nodes) * simulation.steps / simulation.wall_time if stepped else 0.0
@@ -53,6 +55,7 @@ def summarise(
         "wall_time": wall_time,
         "node_steps_per_second": rate,
         "neighbour_list_builds": simulation.list_builds,
+        "stopped": stopped,
         "error": error,
         "checks": [check.as_dict() for check in checks],
     }
@@ -60,9 +63,8 @@ def summarise(
 
 def write_json(path: Path, content: Mapping) -> None:
     """Write a JSON file whole or not at all; non-finite numbers become null."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+    text = json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def _finite(value):

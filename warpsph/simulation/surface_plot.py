@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from .plots import save_picture
 from .simulation import Simulation
-
-DOTS_PER_INCH = 150
 
 
 def plot_surface(simulation: Simulation, path: Path) -> bool:
@@ -34,5 +33,5 @@ def plot_surface(simulation: Simulation, path: Path) -> bool:
     axes.set_ylabel("y [m]")
     axes.set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
+    save_picture(figure, path)
     return True

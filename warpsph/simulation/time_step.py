@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from ..errors import SceneError
 from ..ground.precision import PRECISIONS
 from ..ground.smoothing import SMOOTHING_FUNCTIONS, second_moment
 from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
-from ..scene.material import PerzynaVonMises
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
@@ -28,8 +28,7 @@ def time_step_limit(scene: Scene) -> float:
     """Δt [s]: the one the scene gives, or C Δx/c_p, reduced where sub-stepping could not follow the flow.
 
     Δx is the smallest initial distance across a cell. RK4 sources are sub-stepped up to `MOST_SUBSTEPS` times
-    a half step, each λ Δt ≤ `STIFFNESS_LIMIT`; λ is taken at q = 2Y, where N > 1 is as stiff as it gets in
-    slow loading.
+    a half step, each λ Δt ≤ `STIFFNESS_LIMIT`, λ the material's `flow_rate`.
 
     Raises:
         SceneError: the Courant number (or the given time step) is beyond the wave limit.
@@ -49,14 +48,8 @@ def time_step_limit(scene: Scene) -> float:
             f"up to {limit:.4g}",
         )
     dt = numerics.courant * per_courant
-    flows = isinstance(material, PerzynaVonMises) and material.fluidity > 0.0
-    if flows and numerics.source_scheme == "rk4":
-        rate = (
-            material.relaxation_modulus(lattice.dim)
-            * material.fluidity
-            * material.exponent
-            / material.smallest_yield_size()
-        )
+    rate = material.flow_rate(lattice.dim)
+    if rate > 0.0 and numerics.source_scheme == "rk4":
         dt = min(dt, 2.0 * MOST_SUBSTEPS * STIFFNESS_LIMIT / rate)
     return dt
 
@@ -72,3 +65,29 @@ def divide(duration: float, limit: float) -> tuple[int, float]:
     """
     steps = max(1, math.ceil(duration / limit * (1.0 - ROUNDING)))
     return steps, duration / steps
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of time covered in equal steps.
+
+    Attributes:
+        start, end: simulated times [s].
+        steps: how many.
+        first: number of steps made before it.
+    """
+
+    start: float
+    end: float
+    steps: int
+    first: int
+
+    @property
+    def time_step(self) -> float:
+        """Δt [s]."""
+        return (self.end - self.start) / self.steps
+
+    def time_after(self, steps: int) -> float | None:
+        """Simulated time [s] after so many steps since the run began; None when they lead out of the leg."""
+        made = steps - self.first
+        return self.start + (self.end - self.start) * (made / self.steps) if 0 <= made <= self.steps else None

@@ -1,13 +1,14 @@
-"""Steps 3-10 without the published step's viscosity (docs/velocity_steps.md): means over cells, corrected gradients.
+"""Steps 3-10 without the published viscosity: means over cells, corrected gradients (docs/velocity_steps.md).
 
-3-6.  φ_aux is the mean of the cell's corners, ∇φ there the corrected gradient. What the auxiliary node hands on is
-      δφ = −(Δt/2) div f(φ_s), not φ_aux + δφ, and ∇φ itself.
+3-6.  φ_aux is the mean of the cell's corners, ∇φ there the corrected gradient. The auxiliary node hands on
+      ∇φ and δφ = −(Δt/2) div f(φ_s), after flow. Only smooth strain flows: the rest, elastic, damps what is rough.
 7.    φ_node^{n+1/2} = φ_s + the mean δφ of the node's cells, with the conditions: a node keeps its own value.
 8-9.  ∇φ^{n+1/2} = the mean of the cells' gradients at the node's corner, + the corrected gradient of δφ.
 10.   φ_adv = φ_s − Δt div f(φ^{n+1/2}) − θ (checkerboard of φ_s).
 
-On a lattice, in space, this is a summation by parts in the norm of the elastic energy: Σ m v·a + Σ V σ:Dₑ⁻¹:dσ/dt is
-what the edges let through, to rounding. Tractions must vanish orthogonally in that norm, by elastic unloading.
+On a lattice, in space, this is a summation by parts in the norm of the elastic energy: what Σ m v·dv/dt and
+Σ V σ:Dₑ⁻¹:dσ/dt gain together is what the edges let through, to rounding. Tractions must vanish orthogonally in
+that norm, by elastic unloading. Kernels are stretched and turned with the cells, so that this survives strain.
 """
 
 from functools import cache
@@ -29,8 +30,8 @@ from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
 from ..scene.scene import Scene
 
-# θ: shares of the checkerboard taken off the velocity and the stress in a step. The velocity's costs next to nothing:
-# with 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
+# θ: shares of the checkerboard taken off the velocity and the stress in a step. The velocity's costs little: with
+# 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
 VELOCITY_SHARE = 1.0
 STRESS_SHARE = 0.3
 MARGIN = 0.9
@@ -39,8 +40,8 @@ MARGIN = 0.9
 def corner_share(courant: float, dim: int) -> float:
     """κ: how far from a cell's middle to its corner its gradient is taken, 0 … ½ [-].
 
-    In the middle, a lattice n cells across bends with 1 − 3/n² of its stiffness, with κ = ½ with 1 − 1/n². Yet κ takes
-    from the damping of Lax and Wendroff, which a long compression wave along a diagonal loses first. With
+    In the middle, a lattice n cells across bends with 1 − 3/n² of its stiffness, with κ = ½ with 1 − 1/n². Yet
+    κ takes from the damping of Lax and Wendroff, which a long compression wave along a diagonal loses first. With
     s = sin(kΔ/2) its growth in a step is s⁴ times
 
         2D:  ½ C² (16 C² − 16 (1 − κ)) − θ,        3D:  ½ C² (36 C² + 12 − 48 (1 − κ)) − 3 θ,
@@ -69,7 +70,9 @@ class CompatibleFluxes:
         kernels: the kernels of the two sweeps.
     """
 
-    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device):
+    def __init__(
+        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device
+    ):
         lattice, kernel = scene.lattice, scene.numerics.kernel
         continuum, moves = lattice.continuum, scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
@@ -82,7 +85,9 @@ class CompatibleFluxes:
         self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, ratio, law.Parameters, moves, conditions)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(
+        self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary
+    ) -> None:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         front = STRENGTH * max(1.0 - courant**2, 0.0)
         inputs = [material, dt, front, pairs, nodes, history, auxiliary, self._cells]
@@ -179,7 +184,9 @@ def _to_nodes_kernel(
         point = nodes.point[i]
         increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share)
         phi_half = apply(i, point.phi + increment, conditions)  # 7
-        sums = collect(i, point.x, metric_of(frame, nodes.smoothing_length[i]), types.phi(), pairs, auxiliary.point)
+        sums = collect(
+            i, point.x, metric_of(frame, nodes.smoothing_length[i]), types.phi(), pairs, auxiliary.point
+        )
         grad, volume_ratio = to_half_step(grad_s + gradient(sums, phi_half - point.phi), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 

@@ -30,7 +30,9 @@ class PublishedFluxes:
         kernels: the kernels of the two sweeps.
     """
 
-    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device):
+    def __init__(
+        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device
+    ):
         continuum, numerics = scene.lattice.continuum, scene.numerics
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
@@ -44,7 +46,9 @@ class PublishedFluxes:
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(
+        self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary
+    ) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
         wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)

@@ -12,9 +12,9 @@ from ..nodes.node_sets import (
     material_nodes,
     node_types,
 )
+from ..operators.cell_motion import CellMotion
 from ..operators.conditions import Conditions
 from ..operators.free_surface import FreeSurfaceConditions
-from ..operators.cell_motion import CellMotion
 from ..operators.motion import Motion, NoMotion, centre_kernel
 from ..operators.sources import sources
 from ..operators.spacing import Spacing
@@ -103,7 +103,9 @@ class Stepper:
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         pairs = self._around_auxiliary.pairs
-        self._fluxes.to_auxiliary(self._parameters, dt, self._courant(dt), pairs, self.nodes, self.history, self.auxiliary)
+        self._fluxes.to_auxiliary(
+            self._parameters, dt, self._courant(dt), pairs, self.nodes, self.history, self.auxiliary
+        )
 
     def to_nodes(self, t_half: float, dt: float) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
@@ -116,7 +118,7 @@ class Stepper:
         return dt * self._per_spacing / self.shrinkage
 
     def first_non_finite(self) -> tuple[int, int] | None:
-        """(node, step) where velocity or stress first stopped being finite, or None."""
+        """(node, step) where velocity, stress or displacement first stopped being finite, or None."""
         node, step = self._health.numpy().tolist()
         return None if node < 0 else (node, step)
 

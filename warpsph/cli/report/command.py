@@ -7,9 +7,9 @@ from pathlib import Path
 
 from ... import __version__
 from ...simulation.device import choose_device
+from ..queue import make_missing, processes
 from .cases import cases
 from .page import write_html, write_markdown
-from .queue import make_missing
 
 TITLE = "Blanc and Pastor (2012), reproduced by warpsph"
 
@@ -28,7 +28,9 @@ def report(folder: Path, *, quick: bool, device: str | None, jobs: int, quiet: b
     chosen, figures = cases(quick), folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     device = choose_device(device).alias
-    make_missing([run for case in chosen for run in case.runs], folder / "runs", device, jobs, quiet)
+    runs = [run for case in chosen for run in case.runs]
+    for error in make_missing(runs, folder / "runs", device, processes(jobs), quiet).values():
+        raise error
     sections, results = [], []
     for case in chosen:
         found = {run.name: run.read(folder / "runs" / run.name) for run in case.runs}

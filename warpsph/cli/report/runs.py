@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -14,62 +13,35 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ... import __version__
 from ...errors import SceneError
+from ...export.frames import Frames, FrameWriter
 from ...scene.lattice import Lattice
 from ...scene.scene import Scene
-from ...simulation.time_step import divide, time_step_limit
-from ..catalogue import SceneFile, load
+from ...simulation.history import read_history
+from ..catalogue import SceneFile
 from ..runner import run as run_scene
-from .frames import Frames
-
-OVERHEAD = 1000  # nodes whose work costs as much time as starting a step's kernels on a CPU
+from ..scene_run import SceneRun
+from ..settings import Settings
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(SceneRun):
     """A run the report needs.
 
     Args:
-        name: of its folder.
-        scene: name of a shipped scene.
-        settings: its parameters, `name=value` each.
+        name, scene, settings: see `SceneRun`.
         frames: times at which whole fields are kept [s], rising.
     """
 
-    name: str
-    scene: str
-    settings: tuple[str, ...] = ()
     frames: tuple[float, ...] = ()
 
-    def build(self) -> tuple[SceneFile, Scene, dict[str, object]]:
-        """The scene file, its scene, and the values of its parameters."""
-        file = load(self.scene)
-        return file, *file.build(self.settings)
-
-    def cost(self) -> float:
-        """How much work it is, in node-steps."""
-        _, scene, _ = self.build()
-        return (len(scene.lattice.nodes) + OVERHEAD) * divide(scene.duration, time_step_limit(scene))[0]
-
     def done(self, folder: Path) -> bool:
-        """Whether the folder holds this run, by this version, with these parameters and frames.
-
-        A run that broke down is done as well: it would break down again, and the report says so.
-        """
+        """Whether the folder holds this run with these frames."""
         try:
-            summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            with np.load(folder / "frames.npz") as file:
-                asked = file["asked"].tolist()
+            asked = Frames(folder).times
         except (OSError, ValueError, KeyError):
             return False
-        file, _, values = self.build()
-        return (
-            summary["warpsph_version"] == __version__
-            and summary["scene"] == file.name
-            and summary["parameters"] == json.loads(json.dumps(values))
-            and asked == list(self.frames)
-        )
+        return asked == self.frames and super().done(folder)
 
     def make(self, folder: Path, device: str | None) -> None:
         """Run it; what it prints goes into `log.txt`."""
@@ -86,36 +58,19 @@ class Run:
                     file,
                     scene,
                     values,
-                    device=device,
-                    precision="float64",
-                    until=None,
-                    folder=folder,
+                    Settings(device=device, frames=len(self.frames)),
+                    folder,
                     quiet=False,
-                    watching=[lambda simulation: Frames(simulation, self.frames, folder / "frames.npz")],
+                    watching=[lambda simulation: FrameWriter(simulation, self.frames, folder)],
                 )
             except SceneError as error:  # its checks could not be evaluated: the run keeps its summary
                 print(f"warpsph: {error}")
 
-    def progress(self, folder: Path) -> float:
-        """Share of the simulated time that a run in progress has reached, from its history."""
-        try:
-            with (folder / "history.csv").open("rb") as file:
-                file.seek(max(0, file.seek(0, 2) - 300))
-                line = file.read().decode(errors="replace").splitlines()[-1]
-            return min(1.0, float(line.split(",")[1]) / self.build()[1].duration)
-        except (OSError, ValueError, IndexError):
-            return 0.0
-
     def read(self, folder: Path) -> Result:
         """What it gave."""
-        with (folder / "history.csv").open(newline="", encoding="utf-8") as file:
-            header, *rows = list(csv.reader(file))
-        table = np.array(rows, dtype=float)
-        history = {name.rsplit(" [", 1)[0]: table[:, k] for k, name in enumerate(header)}
-        with np.load(folder / "frames.npz") as file:
-            frames = dict(file)
+        history, _ = read_history(folder / "history.csv")
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        return Result(self, folder, summary, history, frames)
+        return Result(self, folder, summary, history, Frames(folder))
 
 
 @dataclass(frozen=True)
@@ -127,14 +82,14 @@ class Result:
         folder: where.
         summary: its `summary.json`.
         history: its columns, name → values.
-        frames: its `frames.npz`, name → values.
+        frames: its frames.
     """
 
     run: Run
     folder: Path
     summary: Mapping
     history: Mapping[str, np.ndarray]
-    frames: Mapping[str, np.ndarray]
+    frames: Frames
 
     @cached_property
     def _built(self):
@@ -170,8 +125,11 @@ class Result:
         values = [check["value"] for check in self.summary["checks"] if check["name"] == name]
         return math.nan if not values or values[0] is None else values[0]
 
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the frames it has [s]."""
+        return np.array([frame.time for frame in self.frames])
+
     def at(self, field: str, frame: int = -1) -> np.ndarray:
-        """A field of a frame; `displacement` follows from the positions."""
-        if field == "displacement":
-            return self.frames["position"][frame] - self.lattice.nodes
-        return self.frames[field][frame]
+        """A field of a frame."""
+        return self.frames[frame].field(field)

@@ -1,7 +1,8 @@
-"""Material laws: one file each, and one row here."""
+"""Material laws: one file each, and one row here; see docs/materials.md."""
 
 from __future__ import annotations
 
+from ...errors import SceneError, one_of
 from ...scene.dimension import Continuum
 from ...scene.material import Elastic, PerzynaVonMises
 from ..precision import Precision
@@ -13,5 +14,11 @@ LAWS = {Elastic: elastic, PerzynaVonMises: perzyna_von_mises}
 
 
 def law(material: Elastic, continuum: Continuum, precision: Precision) -> Law:
-    """The law of a scene's material."""
+    """The law of a scene's material.
+
+    Raises:
+        SceneError: `LAWS` has no row for it.
+    """
+    if type(material) not in LAWS:
+        raise SceneError("material", material, one_of([kind.__name__ for kind in LAWS]))
     return LAWS[type(material)](continuum, precision)

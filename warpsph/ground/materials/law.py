@@ -16,7 +16,7 @@ class Law:
     Attributes:
         Parameters: Warp struct type.
         fill: material → instance of `Parameters`.
-        history: name and unit of each internal variable a node keeps.
+        history: name, unit and meaning of each internal variable a node keeps; each is a field of the nodes.
         flow: (σ, history, Parameters) → (dσ/dt, d history/dt) by inelastic flow alone.
         flow_stiffness: (σ, history, Parameters) → the rate λ [1/s] at which that flow decays, for the step limit.
         relax: (σ, history, Parameters, Δt) → (σ, history) after that flow has acted for Δt, stable for any Δt.
@@ -24,7 +24,7 @@ class Law:
 
     Parameters: type
     fill: Callable[[object], object]
-    history: tuple[tuple[str, str], ...] = ()
+    history: tuple[tuple[str, str, str], ...] = ()
     flow: wp.Function | None = None
     flow_stiffness: wp.Function | None = None
     relax: wp.Function | None = None

@@ -50,7 +50,8 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
 
     @wp.func
     def current_yield_size(eps: real, p: PerzynaParameters):
-        return wp.max(p.yield_size + p.hardening * eps, p.residual)
+        Y = p.yield_size + p.hardening * eps
+        return wp.where(p.residual > Y, p.residual, Y)  # unlike a maximum, keeps a NaN
 
     @wp.func
     def flow(sigma: stress, history: scalar, p: PerzynaParameters):
@@ -58,7 +59,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
         Y = current_yield_size(history[0], p)
         rate = stress()
         eps_rate = scalar()
-        if q > Y:
+        if not q <= Y:  # a NaN flows, and shows
             over = (q - Y) / Y
             if p.exponent != real(1.0):
                 over = wp.pow(over, p.exponent)
@@ -123,7 +124,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
     return Law(
         PerzynaParameters,
         fill,
-        history=(("equivalent_plastic_strain", "-"),),
+        history=(("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),),
         flow=flow,
         flow_stiffness=flow_stiffness,
         relax=relax,

@@ -83,7 +83,7 @@ def tell(results, picture) -> Section:
 def _figure11(bar, path):
     figure, axes = new_figure(1, 1, (7.5, 5.0))
     at, X = axes[0, 0], bar.lattice.nodes[:, 0]
-    time, u = 1e3 * bar.frames["time"], bar.frames["position"][:, :, 0] - X
+    time, u = 1e3 * bar.times, np.array([frame.field("displacement")[:, 0] for frame in bar.frames])
     drawn = X + MAGNIFIED * u
     middle = np.abs(X - 0.5) < 0.051
     at.fill_betweenx(

@@ -29,7 +29,7 @@ def tell(results, picture) -> Section:
     first, lattice = runs[0], runs[0].lattice
     short = first.parameters.duration < TIMES[-1]
     strain = Panel(
-        f"t = {first.frames['time'][-1]:.3g} s",
+        f"t = {first.times[-1]:.3g} s",
         first.at("position"),
         first.at("equivalent_plastic_strain"),
         lattice,
@@ -41,7 +41,7 @@ def tell(results, picture) -> Section:
             np.linalg.norm(first.at("displacement", k), axis=1),
             lattice,
         )
-        for k, time in enumerate(first.frames["time"])
+        for k, time in enumerate(first.times)
     ]
     toes = [Curve(f"Courant {r.parameters.courant:g}", r.history["time"], r.history["toe"]) for r in runs]
     pictures = [

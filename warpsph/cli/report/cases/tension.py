@@ -156,7 +156,7 @@ def _released(result, path):
     p = SimpleNamespace(**(vars(result.parameters) | {"duration": RELEASED[1]}))
     standard, _ = result.file.module.standard_sph(result.scene, p)
     figure, axes = new_figure(2, 2, (11.0, 4.8), sharex=True, sharey=True)
-    moments = [f"{1e3 * time:.3g} ms" for time in result.frames["time"]]
+    moments = [f"{1e3 * time:.3g} ms" for time in result.times]
     _nodes(axes[0, 0], result.at("position", 0), "start", DARK)
     _nodes(axes[0, 1], standard.x, f"standard SPH, {1e3 * standard.time:.3g} ms", BRIGHT)
     _nodes(axes[1, 0], result.at("position", 1), f"two node sets, {moments[1]}", DARK)

@@ -1,0 +1,220 @@
+"""`warpsph sweep`: combinations, what is done, members that fail, one table; here and on a Dask cluster."""
+
+import csv
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from warpsph.cli.main import main
+from warpsph.cli.sweep import Member, members, said
+from warpsph.errors import SceneError
+
+# A bar of ten cells whose end moves; `fault` is what goes wrong, and when.
+SCENE = '''"""Bar of a sweep."""
+import os, signal, time
+from warpsph import *
+PARAMETERS = (
+    Parameter("velocity", 1.0, "m/s", "of the end"),
+    Parameter("fault", "none", "-", "what", choices=("none", "scene", "killed", "nan", "check", "raise", "slow")),
+)
+
+def scene(p):
+    def end(s):
+        if p.fault == "killed" and s.steps == 5:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if p.fault == "slow":
+            time.sleep(0.05)
+        return s.field("displacement")[-1, 0]
+
+    return Scene(
+        shape=Box((1.0,), 0.1 if p.fault != "scene" else 0.3),
+        material=Elastic(young_modulus=8e7, density=2000.0),
+        conditions=[Fixed(edge("left")), PrescribedVelocity(edge("right"), (moved(p),))],
+        duration=0.01 if p.fault != "slow" else 1.0,
+        numerics=p.numerics,
+        output=Output(interval=0.0, probes=(Probe("u", "m", end),)),
+    )
+
+def moved(p):
+    return lambda t: float("nan") if p.fault == "nan" and t > 0.005 else p.velocity
+
+def checks(run):
+    assert run.parameters.fault != "raise", "no judge"
+    bound = 0.01 if run.parameters.fault != "check" else 0.0
+    return [Check("end", run.history["u"][-1], 0.010001 * run.parameters.velocity, "m", bound)]
+'''
+
+
+@pytest.fixture
+def bar(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bar.py").write_text(SCENE)
+    return "bar.py"
+
+
+def sweep(*arguments):
+    return main(["sweep", "bar.py", "--device", "cpu", *arguments])
+
+
+def table(folder):
+    with (folder / "sweep.csv").open(newline="", encoding="utf-8") as file:
+        return {row["run"]: row for row in csv.DictReader(file)}
+
+
+def test_members_are_all_combinations(bar):
+    found = members(bar, ["velocity=1, 2,1", "courant=0.5,0.9"], "float32")
+    assert [member.name for member in found] == [
+        "velocity=1,courant=0.5",
+        "velocity=1,courant=0.9",
+        "velocity=2,courant=0.5",
+        "velocity=2,courant=0.9",
+    ]
+    assert found[2].settings == ("velocity=2", "courant=0.5") and found[0].precision == "float32"
+    assert [member.name for member in members(bar, [], "float64")] == ["bar"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["velocty=1,2"], r"--set = 'velocty' .*mean velocity\?"),
+        (["velocity=1,fast"], "velocity = 'fast' .* a number"),
+        (["velocity"], "--set = 'velocity' .* name=value,value"),
+        (["velocity=1", "velocity=2"], "--set = 'velocity=2' .* all values of velocity at once"),
+    ],
+)
+def test_wrong_settings_are_refused_before_any_run(settings, message, bar, capsys):
+    assert sweep(*(part for setting in settings for part in ("--set", setting))) == 2
+    assert re.match(f"warpsph: {message}", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--jobs", "0"], "--jobs = 0"),
+        (["--precision", "half"], "precision = 'half'"),
+        (["--device", "gpu"], "device = 'gpu'"),
+    ],
+)
+def test_wrong_options_are_refused(option, message, bar, capsys):
+    assert sweep(*option) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_sweep_survives_its_members_and_tells_all_of_them_in_one_table(bar, tmp_path, capsys):
+    """Scene refused, process killed, NaN, failed check, checks that raise; beside one that passes."""
+    assert sweep("--set", "fault=none,scene,killed,nan,check,raise", "--set", "velocity=2", "--out", "out") == 1
+    rows = table(tmp_path / "out")
+    found = {name.split(",")[0].removeprefix("fault="): row for name, row in rows.items()}
+    assert {fault: row["status"] for fault, row in found.items()} == {
+        "none": "passed",
+        "scene": "failed to run",
+        "killed": "failed to run",
+        "nan": "broke down",
+        "check": "failed",
+        "raise": "failed to run",
+    }
+    assert "AssertionError" in found["raise"]["message"] and "no judge" in found["raise"]["message"]
+    assert "spacing = 0.3" in found["scene"]["message"] and "non-finite in step" in found["nan"]["message"]
+    assert "ended by signal 9" in capsys.readouterr().out
+    assert all(row["velocity"] == "2" for row in rows.values())
+    good = found["none"]
+    assert float(good["end [m]"]) == pytest.approx(0.02, rel=1e-3) and good["end passed"] == "True"
+    assert good["last u [m]"] == good["end [m]"] and good["nodes"] == "11"
+    assert float(good["end error"]) == pytest.approx(1e-4, rel=1e-2) and found["scene"]["end [m]"] == ""
+
+
+def test_only_what_is_missing_is_made(bar, tmp_path, capsys):
+    """Another value, a changed scene file, another precision: those are; what is done is not."""
+    assert sweep("--set", "velocity=1", "--out", "out") == 0
+    assert sweep("--set", "velocity=1,2", "--out", "out") == 0
+    out = capsys.readouterr().out
+    assert "2 runs, 1 of them done already" in out and "[1/1] velocity=2" in out
+    member = Member("velocity=1", str(tmp_path / "bar.py"), ("velocity=1",))
+    folder = tmp_path / "out" / "runs" / "velocity=1"
+    assert member.done(folder)
+    assert not Member(member.name, member.scene, member.settings, "float32").done(folder)
+    assert not Member(member.name, member.scene, ("velocity=1", "courant=0.5")).done(folder)
+    (tmp_path / "bar.py").write_text(SCENE + "# changed\n")
+    assert not member.done(folder)
+
+
+def test_interrupted_sweep_goes_on_from_its_members_checkpoints(bar, tmp_path):
+    """SIGINT reaches the sweep alone: it tells its runs, which stop with a checkpoint; the next call resumes."""
+    command = [sys.executable, "-m", "warpsph", "sweep", bar, "--set", "fault=slow", "--device", "cpu"]
+    process = subprocess.Popen(
+        [*command, "--out", "out"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    folder = tmp_path / "out" / "runs" / "fault=slow"
+    limit = time.monotonic() + 60.0
+    while time.monotonic() < limit and not _rows(folder) > 5:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130 and errors == "warpsph: interrupted; the same command goes on from here\n"
+    assert "stopped after step" in (folder / "log.txt").read_text() and (folder / "checkpoint.npz").is_file()
+    before = _rows(folder)
+    process = subprocess.Popen(
+        [*command, "--out", "out"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    while time.monotonic() < limit and not _rows(folder) > before + 3:
+        time.sleep(0.05)
+    steps = [int(line.split(",")[0]) for line in (folder / "history.csv").read_text().splitlines()[1:]]
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert steps == list(range(len(steps))) and len(steps) > before
+
+
+def _rows(folder):
+    path = folder / "history.csv"
+    return path.read_bytes().count(b"\n") if path.is_file() else 0
+
+
+def test_sweep_on_a_dask_cluster(bar, tmp_path, capsys):
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed (extra dask)")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=True, dashboard_address=None
+    ) as cluster:
+        arguments = ("--set", "fault=none,killed", "--set", "velocity=1,2", "--out", "out")
+        assert sweep(*arguments, "--dask", cluster.scheduler_address) == 1
+        statuses = {name: row["status"] for name, row in table(tmp_path / "out").items()}
+        assert statuses == {
+            "fault=none,velocity=1": "passed",
+            "fault=none,velocity=2": "passed",
+            "fault=killed,velocity=1": "failed to run",
+            "fault=killed,velocity=2": "failed to run",
+        }
+        assert "4 runs, 0 of them done already" in capsys.readouterr().out
+        assert sweep(*arguments, "--dask", cluster.scheduler_address) == 1
+        assert "4 runs, 2 of them done already" in capsys.readouterr().out
+
+
+def test_address_without_a_cluster_is_refused(bar, capsys):
+    pytest.importorskip("distributed", reason="Dask is not installed (extra dask)")
+    assert sweep("--dask", "nonsense://nowhere") == 2
+    assert "--dask = 'nonsense://nowhere'" in capsys.readouterr().err
+
+
+def test_dask_that_is_not_installed_is_said(bar, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert sweep("--dask", "tcp://127.0.0.1:1") == 2
+    assert "pip install distributed" in capsys.readouterr().err
+
+
+def test_member_without_a_log_says_so(tmp_path):
+    assert said(tmp_path) == "it left no log"
+    with pytest.raises(SceneError):
+        members("no_such_scene", [], "float64")
+
+
+def test_members_keep_no_frames_unless_asked(bar, tmp_path):
+    """Those that have none are made again when frames are asked for."""
+    asked = ("--set", "velocity=1", "--out", "out", "--quiet")
+    frames = tmp_path / "out" / "runs" / "velocity=1" / "frames"
+    assert sweep(*asked) == 0 and not frames.exists()
+    assert sweep(*asked, "--frames", "2") == 0 and len(list(frames.glob("0*.npz"))) == 3
+    assert sweep(*asked, "--frames", "few") == 2

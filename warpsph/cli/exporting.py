@@ -1,0 +1,169 @@
+"""What `warpsph run` keeps of a run for later, and the command `warpsph export`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import TypeVar
+
+from ..errors import SceneError, one_of
+from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
+from ..scene.validate import number
+from ..simulation.simulation import Simulation
+from .settings import Settings
+
+Made = TypeVar("Made")
+USD = (".usdc", ".usda")
+# Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
+WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
+
+
+def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Simulation], Lenient]]:
+    """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
+    path = _target("--usd", settings.usd, USD) if settings.usd else None
+    if not settings.frames:
+        return [lambda simulation: _NoFrames(simulation, folder)]
+    followers, times = [], evenly(end, settings.frames)
+    if path:
+        from ..export.usd_live import LiveStage  # USD is slow to import
+
+        followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))
+
+    def recorder(simulation: Simulation) -> Lenient:
+        return Lenient(lambda: FrameWriter(simulation, times, folder, followers), "no further frames are kept")
+
+    return [recorder]
+
+
+class _NoFrames:
+    """Keeps no frames; a new run removes those of a former one, which would be taken for its own."""
+
+    def __init__(self, simulation: Simulation, folder: Path):
+        if not simulation.steps:
+            clear(folder)
+
+    def observe(self, simulation: Simulation) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+class Lenient:
+    """An observer, or a follower of frames, that may fail to write: a full disk must not cost the run its result.
+
+    Args:
+        make: makes what it passes on to.
+        lost: what is lost when that fails, for the message.
+    """
+
+    def __init__(self, make: Callable[[], FrameWriter | Follower], lost: str):
+        self._lost, self._works = lost, True
+        self._inner = self._attempt(make)
+
+    def observe(self, simulation: Simulation) -> None:
+        """Pass on."""
+        self._attempt(lambda: self._inner.observe(simulation))
+
+    def update(self) -> None:
+        """Pass on."""
+        self._attempt(lambda: self._inner.update())
+
+    def close(self) -> None:
+        """Pass on."""
+        self._attempt(lambda: self._inner.close())
+
+    def _attempt(self, task: Callable[[], Made]) -> Made | None:
+        try:
+            return task() if self._works else None
+        except (OSError, RuntimeError) as error:  # USD raises the latter
+            self._works = False
+            print(f"warpsph: {self._lost}, the run goes on ({' '.join(str(error).split())})", file=sys.stderr)
+            return None
+
+
+def add_export(commands) -> None:
+    """Add the command `warpsph export`."""
+    exporting = commands.add_parser(
+        "export",
+        help="write the frames of a run as USD or for ParaView",
+        description="Writes the frames of a run as one USD stage (.usdc, .usda) or as VTK point data (.pvd).",
+    )
+    exporting.add_argument("dir", metavar="DIR", help="folder of a run")
+    exporting.add_argument("file", metavar="FILE", help=f"what to write: {', '.join(WRITERS)}")
+    exporting.add_argument(
+        "--field", metavar="NAME", help="USD: field to colour by, e.g. velocity:y (default: the scene's)"
+    )
+    exporting.add_argument("--colour-map", metavar="MAP", help="USD: a matplotlib colour map (default: cividis)")
+    exporting.add_argument(
+        "--range",
+        metavar="LOW,HIGH",
+        help="USD: values at the ends of the map, e.g. --range=-1e5,0 (default: of all frames)",
+    )
+    exporting.set_defaults(command=_export)
+
+
+def _export(options: argparse.Namespace) -> int:
+    frames = kept_frames(options.dir)
+    path = _target("FILE", options.file, tuple(WRITERS))
+    writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
+    try:
+        if path.suffix in USD:
+            writer.write_stage(frames, path, _colouring(options, frames))
+        else:
+            _refuse_colours(options)
+            writer.write_series(frames, path)
+    except OSError as error:
+        raise SceneError("FILE", options.file, f"it must be a file that can be written ({error})") from None
+    print(f"{path}: {len(frames)} frames, {len(frames.lattice.nodes)} nodes")
+    return 0
+
+
+def _refuse_colours(options: argparse.Namespace) -> None:
+    for name in ("field", "colour_map", "range"):
+        value = getattr(options, name)
+        if value is not None:
+            raise SceneError(
+                f"--{name.replace('_', '-')}", value, "it is for USD; ParaView colours by any field itself"
+            )
+
+
+def _colouring(options: argparse.Namespace, frames: Frames):
+    from ..export.colours import Colouring, named_map, whole_span
+    from ..export.quantity import quantity
+
+    shown, colour_map = quantity(options.field, frames), named_map(options.colour_map)
+    if options.range is None:
+        return Colouring(shown, whole_span(shown, frames), colour_map)
+    try:
+        low, high = (number("--range", float(text)) for text in options.range.split(","))
+        number("--range", high, above=low)
+    except ValueError:
+        raise SceneError("--range", options.range, "it must be LOW,HIGH: two numbers, the second larger") from None
+    return Colouring(shown, (low, high), colour_map)
+
+
+def kept_frames(text: str) -> Frames:
+    """The frames of a run's folder, at least one."""
+    frames = Frames(Path(text))
+    if not len(frames):
+        raise SceneError("DIR", text, "it must be the folder of a run that kept frames (`--frames N`)")
+    return frames
+
+
+def _target(option: str, text: str, suffixes: tuple[str, ...]) -> Path:
+    """The path of a file to be written, in a folder that is made if need be."""
+    path = Path(text)
+    if path.suffix not in suffixes:
+        raise SceneError(option, text, one_of([f"NAME{suffix}" for suffix in suffixes]))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.with_name(f".{path.name}.warpsph")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SceneError(option, text, f"it must be a file that can be written ({error})") from None
+    return path

@@ -1,0 +1,111 @@
+"""How a run is made: remembered in its folder, so that it goes on, or is repeated, in the same way."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+from ..errors import SceneError, one_of
+from ..ground.precision import PRECISIONS
+from ..scene.validate import index, instance, number
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run is made.
+
+    Args:
+        device: Warp device; the first GPU, or else the CPU, when None.
+        precision: float64 or float32.
+        until: simulated time at which it ends [s]; the scene's duration when None.
+        frames: how many to keep for pictures and exports, besides the one at the start; none at all when 0.
+        usd: path of the USD stage it writes; none when None.
+        checkpoint_every: how often it writes a checkpoint; see `parse_interval`.
+    """
+
+    device: str | None = None
+    precision: str = "float64"
+    until: float | None = None
+    frames: int = 50
+    usd: str | None = None
+    checkpoint_every: str = "10min"
+
+    @classmethod
+    def read(cls, table: Mapping) -> Settings:
+        """From the table `[run]` of a stored scene or of a checkpoint.
+
+        Raises:
+            SceneError: an entry is not allowed.
+        """
+        names = [entry.name for entry in fields(cls)]
+        for name, value in table.items():
+            if name in ("device", "precision", "usd", "checkpoint_every"):
+                instance(f"run.{name}", value, str, "a text")
+            elif name not in names:
+                raise SceneError(f"run.{name}", value, one_of(names, name))
+        if "until" in table:
+            number("run.until", table["until"], above=0.0)
+        if "frames" in table:
+            index("run.frames", table["frames"])
+        return cls(**table)
+
+    def table(self) -> dict[str, object]:
+        """What `read` takes; what is None is left out."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        values["usd"] = self.usd and str(Path(self.usd).absolute())  # the run may go on from another folder
+        return {name: value for name, value in values.items() if value is not None}
+
+
+def add_settings(running: argparse.ArgumentParser) -> None:
+    """The options of `warpsph run` that say how."""
+    default = Settings()
+    running.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
+    running.add_argument("--precision", help=f"{' or '.join(PRECISIONS)} (default: {default.precision})")
+    running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
+    running.add_argument(
+        "--frames", metavar="N", help=f"frames to keep for plot and export (default: {default.frames})"
+    )
+    running.add_argument("--usd", metavar="FILE", help="USD stage to write as the run goes on (.usdc or .usda)")
+    running.add_argument(
+        "--checkpoint-every",
+        metavar="N|T",
+        help="write a checkpoint every N steps (500), or every so much simulated time (0.2s) or wall time "
+        f"(10min, 1h); default: {default.checkpoint_every}",
+    )
+
+
+def chosen(options: argparse.Namespace, before: Settings) -> Settings:
+    """What the options say; where they say nothing, what was before.
+
+    Raises:
+        SceneError: an option is not allowed.
+    """
+    given = {
+        "device": options.device,
+        "precision": options.precision,
+        "until": None if options.until is None else _until(options.until),
+        "frames": None if options.frames is None else count(options.frames),
+        "usd": options.usd,
+        "checkpoint_every": options.checkpoint_every,
+    }
+    settings = replace(before, **{name: value for name, value in given.items() if value is not None})
+    if settings.usd and not settings.frames:
+        raise SceneError("--frames", settings.frames, "with --usd it must be at least 1")
+    return settings
+
+
+def _until(text: str) -> float:
+    try:
+        return number("--until", float(text), above=0.0)
+    except ValueError:
+        raise SceneError("--until", text, "it must be a number above 0 [s]") from None
+
+
+def count(text: str) -> int:
+    """A number of frames."""
+    try:
+        return index("--frames", int(text))
+    except ValueError:
+        raise SceneError("--frames", text, "it must be a whole number, at least 0") from None

@@ -1,0 +1,1 @@
+"""Keeps the frames of a run, and turns them into pictures, USD stages and ParaView files."""

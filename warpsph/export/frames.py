@@ -1,0 +1,293 @@
+"""The frame store: whole fields of a run at chosen times, in a folder that pictures and exports read.
+
+    frames/about.json     the scene's name, the times asked for, the walls, what is drawn
+    frames/body.npz       the initial lattice
+    frames/000012.npz     time, step and the fields (float32) at the first step at or after the 12th time
+
+Every file is written under another name and renamed, so that a run that dies leaves whole frames only.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ..errors import SceneError, one_of
+from ..scene.lattice import Lattice
+from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
+from ..simulation.files import whole
+from ..simulation.simulation import Simulation
+from ..simulation.summary import write_json
+from .walls import Wall, walls_of
+
+FOLDER = "frames"
+STORED = ("displacement", "velocity", "stress", "density", "free_surface")  # and the internal variables
+# Fields that follow from the stored ones; displacement is stored since float32 can not hold it in a position.
+DERIVED = {
+    "position": lambda frame: frame.lattice.nodes + frame.field("displacement"),
+    "strain": lambda frame: green_strain(frame.lattice, frame.field("displacement")),
+    "von_mises_stress": lambda frame: von_mises(frame.field("stress"), frame.lattice.continuum),
+    "mean_stress": lambda frame: mean_stress(frame.field("stress"), frame.lattice.continuum),
+}
+FRAME_FILE = re.compile(r"\d{6}\.npz|\.\d{6}\.part\.npz")
+ROUNDING = 1e-9
+
+
+def clear(run: Path, after: float = -1.0) -> None:
+    """Remove the frames of a run folder that are later than a time [s]; all of them unless given."""
+    folder = run / FOLDER
+    if not folder.is_dir():
+        return
+    for path in folder.iterdir():
+        if FRAME_FILE.fullmatch(path.name) and (after < 0.0 or not _earlier(path, after)):
+            path.unlink()
+    if after < 0.0:
+        (folder / "about.json").unlink(missing_ok=True)
+
+
+def _earlier(path: Path, time: float) -> bool:
+    return path.name[0] != "." and float(_load(path)["time"]) <= time * (1.0 + ROUNDING)
+
+
+class Follower(Protocol):
+    """Something told after every frame that was written."""
+
+    def update(self) -> None:
+        """Look at the frames."""
+
+    def close(self) -> None:
+        """Finish: there will be no more."""
+
+
+class FrameWriter:
+    """An observer that writes a frame at the first step at or after each time.
+
+    A simulation that goes on from a time later than 0 keeps the frames it has up to there.
+
+    Args:
+        simulation: the simulation; time 0 is taken at once.
+        times: rising [s].
+        run: the run's folder.
+        followers: make what is told after every frame.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        times: Sequence[float],
+        run: Path | str,
+        followers: Sequence[Callable[[Frames], Follower]] = (),
+    ):
+        run = Path(run)
+        self._folder = run / FOLDER
+        former = _about(run) if simulation.steps else None
+        clear(run, simulation.time if former else -1.0)
+        times, rate = [float(time) for time in times], _rate(times)
+        if former:
+            kept = [time for time in former["times"] if time <= simulation.time * (1.0 + ROUNDING)]
+            times, rate = (
+                kept + [time for time in times if time > simulation.time * (1.0 + ROUNDING)],
+                former["rate"],
+            )
+        self._times = np.array(times)
+        own, internal = fields_of(simulation.scene), internal_variables(simulation.scene)
+        names = [name for name in (*STORED, *internal) if name in own]
+        if simulation.scene.output.field not in (*names, *DERIVED):
+            names.append(simulation.scene.output.field)
+        self._fields = {name: own[name].unit for name in names}
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._describe(simulation, rate)
+        self._due, self._followers = -1.0, ()
+        self.observe(simulation)
+        self._followers = tuple(follow(Frames(run)) for follow in followers)
+
+    def _describe(self, simulation: Simulation, rate: float) -> None:
+        lattice, output, walls = simulation.lattice, simulation.scene.output, walls_of(simulation.scene)
+        parts = {name: getattr(lattice, name) for name in Lattice.__dataclass_fields__}
+        _save(self._folder / "body.npz", parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
+        about = {
+            "scene": simulation.scene.name,
+            "times": self._times.tolist(),
+            "rate": rate,
+            "fields": self._fields,
+            "field": output.field,
+            "component": output.component,
+            "curve": output.curve,
+            "curve_reference": output.curve_reference,
+            "walls": [{"name": wall.name, "still": wall.still} for wall in walls],
+        }
+        write_json(self._folder / "about.json", about)
+
+    def observe(self, simulation: Simulation) -> None:
+        """Write a frame when its time has come."""
+        if simulation.time < self._due:
+            return
+        passed = int(np.searchsorted(self._times, simulation.time * (1.0 + ROUNDING), side="right"))
+        self._due = self._times[passed] * (1.0 - ROUNDING) if passed < len(self._times) else float("inf")
+        path = self._folder / f"{passed - 1:06d}.npz"
+        if passed and not path.exists():
+            fields = {name: simulation.field(name).astype(np.float32) for name in self._fields}
+            _save(path, {"time": simulation.time, "step": simulation.steps} | fields)
+            for follower in self._followers:
+                follower.update()
+
+    def close(self) -> None:
+        """Close the followers; the frames themselves are whole at any time."""
+        for follower in self._followers:
+            follower.close()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The body at one time.
+
+    Attributes:
+        number: index of the time asked for.
+        time: simulated time [s].
+        step: number of the step.
+        lattice: the initial lattice.
+        stored: the stored fields, name → values.
+    """
+
+    number: int
+    time: float
+    step: int
+    lattice: Lattice
+    stored: Mapping[str, np.ndarray]
+
+    def field(self, name: str) -> np.ndarray:
+        """A node field, as `Simulation.field` gives it (to float32).
+
+        Raises:
+            SceneError: frames have no field of that name.
+        """
+        if name in self.stored:
+            return self.stored[name].astype(float)
+        if name not in DERIVED:
+            raise SceneError("field", name, one_of([*self.stored, *DERIVED], name))
+        return DERIVED[name](self)
+
+
+class Frames(Sequence):
+    """The frames of a run folder, in the order of time; read when they are asked for.
+
+    Args:
+        run: the run's folder.
+
+    Attributes:
+        run: the folder.
+        about: what `about.json` says.
+        times: those asked for [s].
+        rate: frames a second of simulated time [1/s].
+        lattice: the initial lattice.
+        walls: what surrounds the body.
+
+    Raises:
+        SceneError: it is no folder of a run with frames.
+    """
+
+    def __init__(self, run: Path | str):
+        self.run = Path(run)
+        self.about = _about(self.run)
+        if self.about is None:
+            raise SceneError("DIR", str(run), "it must be the folder of a run that kept frames (`--frames N`)")
+        self.times, self.rate = tuple(self.about["times"]), self.about["rate"]
+
+    @cached_property
+    def _body(self) -> Mapping[str, np.ndarray]:
+        return _load(self.run / FOLDER / "body.npz")
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """The initial lattice."""
+        parts = {name: self._body[name] for name in Lattice.__dataclass_fields__}
+        return Lattice(**parts | {"spacing": float(parts["spacing"])})
+
+    @cached_property
+    def walls(self) -> tuple[Wall, ...]:
+        """What surrounds the body."""
+        return tuple(
+            Wall(wall["name"], self._body[f"wall_{k}"], wall["still"])
+            for k, wall in enumerate(self.about["walls"])
+        )
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields its frames have."""
+        kept = self.about["fields"]
+        known = [name for name in FIELDS if name in DERIVED or name in kept]
+        return (*known, *(name for name in kept if name not in known))
+
+    def unit(self, name: str) -> str:
+        """Unit of a field."""
+        return FIELDS[name].unit if name in FIELDS else self.about["fields"][name]
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the frames there are now, also while the run goes on."""
+        return sorted(int(path.stem) for path in (self.run / FOLDER).glob("[0-9]" * 6 + ".npz"))
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, k: int) -> Frame:
+        return self.read(self.numbers[k])
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self.read(number) for number in self.numbers)
+
+    def read(self, number: int) -> Frame:
+        """The frame of that number."""
+        stored = _load(self.run / FOLDER / f"{number:06d}.npz")
+        time, step = float(stored.pop("time")), int(stored.pop("step"))
+        return Frame(number, time, step, self.lattice, stored)
+
+    def code(self, number: int) -> float:
+        """A frame's place on a time line of `rate` codes a second; whole numbers for evenly spaced times."""
+        return round(self.times[number] * self.rate, 6)
+
+    @property
+    def codes(self) -> list[float]:
+        """The places of all frames on the time line."""
+        return [self.code(number) for number in self.numbers]
+
+    def nearest(self, time: float) -> Frame:
+        """The frame nearest to a time [s]."""
+        return self.read(min(self.numbers, key=lambda number: abs(self.times[number] - time)))
+
+
+def evenly(end: float, count: int) -> np.ndarray:
+    """Times of `count` frames up to the end [s], and of one at the start, shape (count + 1,)."""
+    return np.linspace(0.0, end, count + 1)
+
+
+def _rate(times: Sequence[float]) -> float:
+    return (len(times) - 1) / float(times[-1]) if len(times) > 1 else 1.0
+
+
+def _about(run: Path) -> dict | None:
+    try:
+        return json.loads((run / FOLDER / "about.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _save(path: Path, arrays: Mapping[str, object]) -> None:
+    with whole(path) as temporary:
+        np.savez(temporary, **arrays)
+
+
+def _load(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path) as file:
+            return dict(file)
+    except (OSError, ValueError, BadZipFile) as error:
+        raise SceneError("frame", str(path), f"it can not be read ({error}); delete it") from None

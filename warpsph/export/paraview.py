@@ -1,0 +1,113 @@
+"""A run for ParaView: VTK point data, one `.vtp` a frame, and a `.pvd` that gives their times.
+
+Nodes are points; between them the cells of a plane body, the surface of a solid or the line of a bar. Written by
+VTK itself, an optional extra.
+"""
+
+from __future__ import annotations
+
+import shutil
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..errors import SceneError
+from ..scene.lattice import Lattice
+from ..simulation.files import whole
+from .files import in_space
+from .frames import Frame, Frames
+
+# Stored components in VTK's order of a symmetric tensor.
+TENSOR = {(0, 0): 0, (1, 1): 1, (2, 2): 2, (0, 1): 3, (1, 2): 4, (0, 2): 5}
+COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+
+
+@cache
+def _vtk():
+    """The parts of VTK that are needed."""
+    try:
+        from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkIOXML
+        from vtkmodules.util import numpy_support
+    except ImportError:
+        raise SceneError("FILE", ".pvd", "ParaView files need VTK: pip install vtk") from None
+    return vtkCommonCore, vtkCommonDataModel, vtkIOXML, numpy_support
+
+
+def write_series(frames: Frames, path: Path) -> None:
+    """Write `NAME.pvd` and, in `NAME_frames/`, a `.vtp` a frame; the `.pvd` comes last and whole."""
+    _vtk()
+    folder = path.with_name(f"{path.stem}_frames")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    root = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for frame in frames:
+        file = folder / f"{frame.number:06d}.vtp"
+        _write(_body(frame, frames.fields), file)
+        part = {"timestep": repr(frame.time), "part": "0", "file": f"{folder.name}/{file.name}"}
+        ElementTree.SubElement(collection, "DataSet", part)
+    ElementTree.indent(root)
+    with whole(path) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+
+
+def _body(frame: Frame, fields: tuple[str, ...]):
+    core, model, _, support = _vtk()
+    body, points = model.vtkPolyData(), core.vtkPoints()
+    points.SetData(support.numpy_to_vtk(in_space(frame.field("position")), deep=True))
+    body.SetPoints(points)
+    body.SetVerts(_cells(np.arange(len(frame.lattice.nodes))[:, None]))
+    if frame.lattice.dim == 1:
+        body.SetLines(_cells(frame.lattice.cells))
+    else:
+        body.SetPolys(_cells(_polygons(frame.lattice)))
+    for name in fields:
+        if name != "position":
+            body.GetPointData().AddArray(_array(name, frame.field(name), frame.lattice))
+    return body
+
+
+def _polygons(lattice: Lattice) -> np.ndarray:
+    """Corners in turn of what can be seen: the cells of a plane body, the faces of a solid."""
+    return (lattice.cells if lattice.dim == 2 else lattice.faces)[:, [0, 1, 3, 2]]
+
+
+def _cells(corners: np.ndarray):
+    """VTK cells of equal size from the indices of their corners (k, corners)."""
+    _, model, _, support = _vtk()
+    cells, (count, size) = model.vtkCellArray(), corners.shape
+    offsets = np.arange(count + 1, dtype=np.int64) * size
+    connectivity = np.ascontiguousarray(corners, dtype=np.int64).ravel()
+    cells.SetData(
+        support.numpy_to_vtkIdTypeArray(offsets, deep=True),
+        support.numpy_to_vtkIdTypeArray(connectivity, deep=True),
+    )
+    return cells
+
+
+def _array(name: str, values: np.ndarray, lattice: Lattice):
+    """A field (n, …) as a VTK array: vectors with three components, tensors symmetric with six."""
+    support, tensor = _vtk()[3], lattice.continuum.pairs
+    shown, names = np.asarray(values, dtype=np.float32), ()
+    if name in ("stress", "strain"):
+        shown, names = np.zeros((len(values), 6), dtype=np.float32), COMPONENTS
+        shown[:, [TENSOR[pair] for pair in tensor]] = values
+    elif values.ndim == 2:
+        shown = in_space(values).astype(np.float32)
+    elif values.ndim == 3:
+        shown = shown.reshape(len(values), -1)
+    array = support.numpy_to_vtk(np.ascontiguousarray(shown), deep=True)
+    array.SetName(name)
+    for k, part in enumerate(names):
+        array.SetComponentName(k, part)
+    return array
+
+
+def _write(body, path: Path) -> None:
+    writer = _vtk()[2].vtkXMLPolyDataWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(body)
+    if not writer.Write():
+        raise OSError(f"VTK can not write {path}")

@@ -1,0 +1,190 @@
+"""A run as one USD stage, for usdview, Omniverse, Blender and Houdini.
+
+    /Run                    Xform; warpsph:time is the exact simulated time of each frame [s]
+    /Run/MaterialNodes      Points, coloured by one field, with stress, strain and flags as primvars
+    /Run/AuxiliaryNodes     Points in the middle of the cells, hidden at first
+    /Run/Walls/…            a Mesh for what holds or moves the body's edge
+
+Metres and seconds: one second of the time line is one second of the run. Bars and plane strain lie in the xy plane
+of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
+
+from .. import __version__
+from ..simulation.fields import component_names
+from ..simulation.files import whole
+from .colours import Colouring, whole_span
+from .files import in_space
+from .frames import Frame, Frames
+from .quantity import quantity
+from .walls import WallMesh
+
+ROOT, MATERIAL, AUXILIARY, WALLS = "/Run", "/Run/MaterialNodes", "/Run/AuxiliaryNodes", "/Run/Walls"
+NO_PRIMVARS = ("position", "displacement", "velocity", "density")  # in the points, or in nobody's way
+FLAGS = ("free_surface",)
+PLAYBACK = 24.0  # [frames/s], of players that show every frame
+WALL_COLOUR = Gf.Vec3f(0.18, 0.18, 0.2)
+AT_ONCE = 8  # frames kept in memory before they go to the file
+
+
+def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) -> None:
+    """Write all frames into one stage; the file is whole or, if this dies, still the former one."""
+    if colouring is None:
+        shown = quantity(None, frames)
+        colouring = Colouring(shown, whole_span(shown, frames))
+    with whole(path) as temporary:
+        stage = Usd.Stage.CreateNew(str(temporary))
+        drawing = Drawing(stage, frames, colouring)
+        drawing.describe()
+        for k, frame in enumerate(frames):
+            drawing.add(frame)
+            if path.suffix == ".usdc" and k % AT_ONCE == AT_ONCE - 1:
+                stage.Save()  # appends: what is in the file leaves the memory
+        drawing.span_time(frames.codes)
+        stage.Save()
+
+
+class Drawing:
+    """The prims of a run on a stage.
+
+    Args:
+        stage: the stage.
+        frames: what is drawn; its lattice and walls are, its frames only when they are added.
+        colouring: the colours of the nodes.
+    """
+
+    def __init__(self, stage: Usd.Stage, frames: Frames, colouring: Colouring):
+        self._stage, self._frames, self._colouring = stage, frames, colouring
+        self._root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+        self._time = self._root.CreateAttribute("warpsph:time", Sdf.ValueTypeNames.Double)
+        self._nodes = NodePoints(stage, MATERIAL, frames.lattice.spacing)
+        self._cells = NodePoints(stage, AUXILIARY, 0.5 * frames.lattice.spacing)
+        self._fields = [name for name in frames.fields if name not in NO_PRIMVARS]
+        for name in self._fields:
+            self._nodes.declare(name, component_names(name, frames.lattice.continuum))
+        UsdGeom.Scope.Define(stage, WALLS)
+        self._walls = [
+            (
+                WallMesh.of(frames.lattice, wall),
+                UsdGeom.Mesh.Define(stage, f"{WALLS}/{wall.name}"),
+            )
+            for wall in frames.walls
+        ]
+
+    def describe(self) -> None:
+        """Write what does not change: the stage's units and axes, ids, widths, topology."""
+        stage, lattice, colouring = self._stage, self._frames.lattice, self._colouring
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if lattice.dim == 3 else UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        stage.SetDefaultPrim(self._root)
+        stage.SetTimeCodesPerSecond(self._frames.rate)
+        stage.SetFramesPerSecond(PLAYBACK)
+        stage.GetRootLayer().customLayerData = {
+            "warpsph": {
+                "version": __version__,
+                "scene": self._frames.about["scene"],
+                "colour": colouring.quantity.label,
+                "colourMap": colouring.map,
+                "colourRange": Gf.Vec2d(*colouring.span),
+            }
+        }
+        Usd.ModelAPI(self._root).SetKind(Kind.Tokens.component)
+        self._nodes.describe(len(lattice.nodes))
+        self._cells.describe(len(lattice.cells))
+        UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+        for mesh, prim in self._walls:
+            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.polygons), 4, dtype=np.int32)))
+            prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.polygons.astype(np.int32).ravel()))
+            prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+            prim.CreateDoubleSidedAttr(True)
+            prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([WALL_COLOUR]))
+            if mesh.wall.still:
+                self._set_wall(mesh, prim, lattice.nodes, Usd.TimeCode.Default())
+
+    def add(self, frame: Frame) -> None:
+        """Write a frame at its time code."""
+        code, lattice = Usd.TimeCode(self._frames.code(frame.number)), frame.lattice
+        self._time.Set(frame.time, code)
+        position, velocity = frame.field("position"), frame.field("velocity")
+        values = self._colouring.quantity(frame)
+        self._nodes.set(position, velocity, self._colouring.linear(values), code)
+        for name in self._fields:
+            self._nodes.set_field(name, frame.field(name), code)
+        mean = [lattice.at_centres(field) for field in (position, velocity, values)]
+        self._cells.set(*mean[:2], self._colouring.linear(mean[2]), code)
+        for mesh, prim in self._walls:
+            if not mesh.wall.still:
+                self._set_wall(mesh, prim, position, code)
+
+    def span_time(self, codes: Sequence[float]) -> None:
+        """Say from where to where the time line goes."""
+        if len(codes):
+            self._stage.SetStartTimeCode(codes[0])
+            self._stage.SetEndTimeCode(codes[-1])
+
+    def _set_wall(self, mesh: WallMesh, prim: UsdGeom.Mesh, position: np.ndarray, code: Usd.TimeCode) -> None:
+        points = mesh.points(position).astype(np.float32)
+        prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
+        prim.CreateExtentAttr().Set(_extent(points, 0.0), code)
+
+
+class NodePoints:
+    """Nodes as `UsdGeom.Points`.
+
+    Args:
+        stage: the stage.
+        path: of the prim.
+        width: diameter of a node [m].
+    """
+
+    def __init__(self, stage: Usd.Stage, path: str, width: float):
+        self._points, self._width = UsdGeom.Points.Define(stage, path), float(np.float32(width))
+        self.prim = self._points.GetPrim()
+        self._colour = self._points.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+        self._primvars: dict[str, list[UsdGeom.Primvar]] = {}
+
+    def describe(self, count: int) -> None:
+        """Write ids and the width."""
+        self._points.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(count, dtype=np.int64)))
+        self._points.CreateWidthsAttr(Vt.FloatArray([self._width]))
+        self._points.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+
+    def set(self, position: np.ndarray, velocity: np.ndarray, colour: np.ndarray, code: Usd.TimeCode) -> None:
+        """Write positions [m], velocities [m/s], both (n, d), and colours (n, 3) of a frame."""
+        points = _single(position)
+        self._points.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
+        self._points.CreateVelocitiesAttr().Set(Vt.Vec3fArray.FromNumpy(_single(velocity)), code)
+        self._points.CreateExtentAttr().Set(_extent(points, 0.5 * self._width), code)
+        self._colour.Set(Vt.Vec3fArray.FromNumpy(colour), code)
+
+    def declare(self, name: str, components: tuple[str, ...]) -> None:
+        """Make the primvars of a field, one a component: whole numbers for flags, float for all others."""
+        kind = Sdf.ValueTypeNames.IntArray if name in FLAGS else Sdf.ValueTypeNames.FloatArray
+        names = [f"{name}_{part}" for part in components] or [name]
+        primvars = UsdGeom.PrimvarsAPI(self.prim)
+        self._primvars[name] = [primvars.CreatePrimvar(full, kind, UsdGeom.Tokens.vertex) for full in names]
+
+    def set_field(self, name: str, values: np.ndarray, code: Usd.TimeCode) -> None:
+        """Write a declared field (n, …) of a frame."""
+        array, number = (Vt.IntArray, np.int32) if name in FLAGS else (Vt.FloatArray, np.float32)
+        columns = values.reshape(len(values), -1).astype(number).T
+        for primvar, column in zip(self._primvars[name], columns, strict=True):
+            primvar.Set(array.FromNumpy(np.ascontiguousarray(column)), code)
+
+
+def _single(vectors: np.ndarray) -> np.ndarray:
+    return in_space(vectors).astype(np.float32)
+
+
+def _extent(points: np.ndarray, radius: float) -> Vt.Vec3fArray:
+    columns = np.ascontiguousarray(points.T)
+    return Vt.Vec3fArray.FromNumpy(
+        np.stack([columns.min(axis=1) - radius, columns.max(axis=1) + radius]).astype(np.float32)
+    )

@@ -1,0 +1,136 @@
+"""How a run is looked at: one quantity on the deformed body, at the same scale and colours in every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from ..scene.lattice import Lattice
+from ..simulation.plots import COLOUR_MAP, DARK, beyond, draw_cells, percentiles, span_of
+from .frames import Frame, Frames
+from .quantity import Quantity
+
+MARGIN = 0.04
+GRID = "#8a8a8a"
+
+
+@dataclass(frozen=True)
+class View:
+    """A quantity of a run.
+
+    Attributes:
+        quantity: what is shown.
+        span: its values at the ends of the colours.
+        values: its smallest and largest value over all frames.
+        low, high: corners of the box that holds the body in all frames [m], shape (d,).
+    """
+
+    quantity: Quantity
+    span: tuple[float, float]
+    values: tuple[float, float]
+    low: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def of(cls, frames: Frames, quantity: Quantity) -> View:
+        """The view that shows all frames."""
+        spans, values, corners = [], [], []
+        for frame in frames:
+            shown, position = quantity(frame), frame.field("position")
+            spans.append(percentiles(shown))
+            values.append((shown.min(), shown.max()))
+            corners.append((position.min(axis=0), position.max(axis=0)))
+        low, high = np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]
+        margin = MARGIN * (high - low).max()
+        extremes = (float(np.min(values)), float(np.max(values)))
+        return cls(quantity, span_of(spans), extremes, low - margin, high + margin)
+
+    @property
+    def width_to_height(self) -> float:
+        """Of the box."""
+        return float((self.high[0] - self.low[0]) / (self.high[-1] - self.low[-1])) if len(self.low) > 1 else 2.0
+
+    def axes(self, figure: Figure, *place) -> Axes:
+        """New axes for it."""
+        return figure.add_subplot(*place, projection="3d" if len(self.low) == 3 else None)
+
+    def draw(self, axes: Axes, frame: Frame, **style) -> None:
+        """Draw a frame into its axes."""
+        position, values = frame.field("position"), self.quantity(frame)
+        if len(self.low) == 1:
+            axes.plot(position[:, 0], values, **{"color": DARK, "linewidth": 1.2} | style)
+            room = 0.05 * (self.values[1] - self.values[0]) or 1.0
+            axes.set(xlabel="x [m]", ylabel=self.quantity.label, xlim=(self.low[0], self.high[0]))
+            axes.set_ylim(self.values[0] - room, self.values[1] + room)
+            axes.grid(alpha=0.3)
+        elif len(self.low) == 2:
+            draw_cells(axes, position, values, frame.lattice, self.span, **style)
+            axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
+        else:
+            colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.lattice, values)))
+            _solid(axes, frame.lattice, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
+            axes.set(
+                xlim=(self.low[0], self.high[0]),
+                ylim=(self.low[1], self.high[1]),
+                zlim=(self.low[2], self.high[2]),
+            )
+            axes.set_box_aspect(self.high - self.low)
+
+    def draw_grid(self, axes: Axes, frame: Frame) -> None:
+        """Draw the deformed cells over the outline of the initial body, magnified where they hardly move."""
+        displacement, lattice = frame.field("displacement"), frame.lattice
+        scale = magnification(np.linalg.norm(displacement, axis=1).max(), np.ptp(lattice.nodes, axis=0).max())
+        position = lattice.nodes + scale * displacement
+        if len(self.low) == 3:
+            _solid(axes, lattice, position, facecolors="#e8e8e8", edgecolors=DARK, linewidths=0.3)
+            axes.set_box_aspect(np.ptp(position, axis=0))
+            axes.set(**{f"{k}lim": (x.min(), x.max()) for k, x in zip("xyz", position.T, strict=True)})
+        else:
+            around = position[lattice.cells[:, [0, 1, 3, 2, 0]]]
+            cut = np.full((len(around), 1, 2), np.nan)
+            axes.plot(*np.concatenate([around, cut], axis=1).reshape(-1, 2).T, color=DARK, linewidth=0.4)
+            edges = np.concatenate(
+                [lattice.nodes[lattice.faces], np.full((len(lattice.faces), 1, 2), np.nan)], axis=1
+            )
+            axes.plot(*edges.reshape(-1, 2).T, color=GRID, linewidth=1.0, linestyle="--")
+            axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        axes.set_title(
+            f"deformation, t = {frame.time:.4g} s" + (f" (× {scale:g})" if scale != 1.0 else ""), fontsize=10
+        )
+
+    def colour_bar(self, figure: Figure, axes, **place) -> None:
+        """The bar that explains the colours; a bar's values stand on an axis already."""
+        if len(self.low) > 1:
+            scale = ScalarMappable(Normalize(*self.span), COLOUR_MAP)
+            extend = beyond(np.array(self.values), self.span)
+            pad = 0.08 if len(self.low) == 3 else 0.02  # room for the labels of the z axis
+            figure.colorbar(scale, ax=axes, label=self.quantity.label, extend=extend, **{"pad": pad} | place)
+
+
+def magnification(displacement: float, size: float) -> float:
+    """By what a displacement is drawn larger: 1, 2 or 5 times a power of ten, 1 from 2 % of the body's size on.
+
+    >>> magnification(0.5, 10.0), magnification(1e-4, 1.0), magnification(0.0, 1.0)
+    (1.0, 500.0, 1.0)
+    """
+    if displacement >= 0.02 * size or displacement <= 1e-9 * size:
+        return 1.0
+    wanted = 0.08 * size / displacement
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted))
+
+
+def _of_faces(lattice: Lattice, values: np.ndarray) -> np.ndarray:
+    return values[lattice.faces].mean(axis=1)
+
+
+def _solid(axes: Axes, lattice: Lattice, position: np.ndarray, **style) -> None:
+    axes.add_collection3d(Poly3DCollection(position[lattice.faces[:, [0, 1, 3, 2]]], **style))
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")

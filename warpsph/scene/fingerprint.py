@@ -1,0 +1,50 @@
+"""A scene's fingerprint: equal for scenes that compute and record the same, however they were written."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from .scene import Scene
+from .validate import TimeFunction
+
+# Functions of time may be any code: they are compared by their values at so many times.
+SAMPLES = 257
+
+
+def fingerprint(scene: Scene) -> str:
+    """SHA-256 of the resolved scene as hexadecimal digits.
+
+    Nodes, cells, resolved conditions, initial fields, material, numerics, loads and the history's columns count;
+    names, pictures and checks do not.
+    """
+    digest = hashlib.sha256()
+    for name, value in _parts(scene):
+        values = np.ascontiguousarray(value) if isinstance(value, np.ndarray) else None
+        text = repr(value) if values is None else f"{values.dtype.str}{values.shape}"
+        digest.update(f"{name}={text};".encode())
+        if values is not None:
+            digest.update(values.tobytes())
+    return digest.hexdigest()
+
+
+def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
+    lattice, boundary, output = scene.lattice, scene.boundary, scene.output
+    times = np.linspace(0.0, scene.duration, SAMPLES).tolist()
+    yield from (("nodes", lattice.nodes), ("cells", lattice.cells), ("faces", lattice.faces))
+    for name in ("nodes", "velocity_projector", "stress_projector", "amplitude", "function", "moved"):
+        yield f"boundary.{name}", getattr(boundary, name)
+    yield "boundary.functions", np.array([_sample(function, times) for function in boundary.functions])
+    yield from (("velocity", scene.initial_velocity), ("stress", scene.initial_stress))
+    force = scene.body_force
+    yield "body_force", None if force is None else np.array([force(t) for t in times])
+    for name in ("material", "numerics", "damping", "large_displacements", "free_surface", "duration"):
+        yield name, getattr(scene, name)
+    yield "columns", [(probe.name, probe.unit) for probe in output.probes]
+    yield "interval", output.interval
+
+
+def _sample(function: TimeFunction, times: list[float]) -> list[float]:
+    return [float(function(t)) if callable(function) else float(function) for t in times]
