@@ -36,7 +36,7 @@ class Stepper:
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
-        shrinkage: least spacing of the nodes over the initial one, at most 1, as of the last list.
+        shrinkage: least time of a wave from node to node over the initial one, at most 1, as of the last list.
         list_builds: how often the pair lists were built.
     """
 
