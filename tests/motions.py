@@ -58,7 +58,8 @@ CANTILEVER_PERIOD = 0.2552  # [s], METHOD section 4
 
 
 def cantilever(across, periods, poisson_ratio=0.3975, **numerics):
-    """The cantilever of METHOD section 4, swinging freely from the velocity of its first mode (Euler, Bernoulli)."""
+    """The cantilever of METHOD section 4, swinging freely from the velocity of its first mode (Euler,
+    Bernoulli)."""
     length, height, amplitude = 0.2, 0.02, 0.01
     b = 1.8751040687 / length
     ratio = (np.cosh(b * length) + np.cos(b * length)) / (np.sinh(b * length) + np.sin(b * length))
@@ -106,8 +107,8 @@ def hanging_bar(cells, periods, material=HANGING, large_displacements=True, **nu
 class Energies:
     """Kinetic, elastic and potential energy of a run, sampled as it goes.
 
-    On a lattice the nodes' volumes are the weights of the trapezium rule. The elastic energy is taken of the nodes'
-    stresses, with the initial volumes.
+    On a lattice the nodes' volumes are the weights of the trapezium rule. The elastic energy is taken of
+    the nodes' stresses, with the initial volumes.
     """
 
     def __init__(self, simulation, every=1, observe=lambda simulation: None):
