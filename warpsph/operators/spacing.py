@@ -1,10 +1,11 @@
 """How much sooner than at the start a wave is at the next node, as far as the time step can feel it.
 
-A corrected gradient multiplies neighbours' values by G_J = A⁻¹ g_J r_J, A = Σ g_J r_J r_J, g_J = V_J (−W′/ξ). By Cauchy
-and Schwarz Σ |e · G_J| ≤ √(Σ g/λ) along any direction e, λ the least eigenvalue of A, with equality on a lattice: waves are
-stable for c_p Δt ≤ 2 √(λ/Σ g). That is METHOD's 2 √m₂ Δx, wherever the nodes now are. The stiffness stays what it is while
-the density falls where a body is stretched, so c_p ∝ ρ^−½ there: in a solid stretched three times all round waves
-are √3 times as fast from node to node as at the start.
+A corrected gradient multiplies neighbours' values by G_J = A⁻¹ g_J r_J, A = Σ g_J r_J r_J, g_J = V_J
+(−W′/ξ). By Cauchy and Schwarz Σ |e · G_J| ≤ √(Σ g/λ) along any direction e, λ the least eigenvalue of A,
+with equality on a lattice: waves are stable for c_p Δt ≤ 2 √(λ/Σ g). That is METHOD's 2 √m₂ Δx, wherever
+the nodes now are. The stiffness stays what it is while the density falls where a body is stretched, so c_p
+∝ ρ^−½ there: in a solid stretched three times all round waves are √3 times as fast from node to node as at
+the start.
 """
 
 from functools import cache
