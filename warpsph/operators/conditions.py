@@ -110,7 +110,10 @@ class Conditions:
     def locate(self, nodes) -> None:
         """Nothing: all conditions are on nodes chosen once and for all."""
 
-    def follow(self, nodes, dt: float) -> None:
+    def turn(self, nodes, dt: float) -> None:
+        """Nothing: their directions stay the initial ones."""
+
+    def follow(self, nodes) -> None:
         """Nothing."""
 
     def apply(self, nodes, t: float, step: int, health: wp.array) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.linear_algebra import rotation_of
 from ..ground.precision import Precision
 from ..ground.smoothing import wendland_c2
 from ..ground.unknowns import unknowns
@@ -80,13 +81,18 @@ class FreeSurfaceConditions(Conditions):
         self._turned.zero_()
         self._outdated.zero_()
 
-    def follow(self, nodes, dt: float) -> None:
-        """Find the free surface anew once it may have turned noticeably; never at small displacements."""
-        if not self._moves:
-            return
-        inputs = [nodes, self._scan.candidates, dt, self._turned, self._outdated]
-        wp.launch(self._turn, self._b, inputs=inputs, device=self._turned.device)
-        if self._outdated.numpy()[0]:
+    def turn(self, nodes, dt: float) -> None:
+        """Turn the directions freed as the stresses turn in the same time; never at small displacements.
+
+        A normal that lags by θ leaves the shear traction σ_tt θ, which drives a spinning body round.
+        """
+        if self._moves:
+            inputs = [nodes, self._scan.candidates, dt, self.table, self._turned, self._outdated]
+            wp.launch(self._turn, self._b, inputs=inputs, device=self._turned.device)
+
+    def follow(self, nodes) -> None:
+        """Find the free surface anew once it may have turned noticeably."""
+        if self._moves and self._outdated.numpy()[0]:
             self.locate(nodes)
 
     def on_surface(self) -> np.ndarray:
@@ -233,18 +239,25 @@ def _project_kernel(continuum: Continuum, precision: Precision):
 @cache
 def _turn_kernel(continuum: Continuum, precision: Precision):
     MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
-    Candidates = surface_types(continuum, precision).Candidates
+    Candidates, Table = (
+        surface_types(continuum, precision).Candidates,
+        free_surface_types(continuum, precision).Table,
+    )
+    rotation = rotation_of(continuum.dim, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def turn(
         nodes: MaterialNodes,
         candidates: Candidates,
         dt: real,
+        table: Table,
         turned: wp.array(dtype=real),
         outdated: wp.array(dtype=wp.int32),
     ):
         c = wp.tid()
         L = nodes.velocity_gradient[candidates.node[c]]
+        R = rotation(L, dt)
+        table.projector[c] = R * table.projector[c] * wp.transpose(R)
         turned[c] += dt * wp.sqrt(wp.ddot(L, L))
         if turned[c] > real(LARGEST_TURN):
             outdated[0] = 1

@@ -1,8 +1,9 @@
-"""How much closer than at the start the nodes are, as far as the time step can feel it.
+"""How much sooner than at the start a wave is at the next node, as far as the time step can feel it.
 
 Kernels are stretched and turned with the cells, so in a cell's own coordinates ξ every gradient is a lattice's,
 whose waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 3). In space that gradient grows with ∇ξ, at most by
 its largest singular value: Δx is the least singular value of the cell's edges ∂x/∂ξ, the least distance across it.
+The stiffness stays what it is while the density falls where a body is stretched, so that c_p ∝ ρ^−½ there.
 """
 
 from functools import cache
@@ -21,7 +22,7 @@ DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that di
 
 
 class Spacing:
-    """Measures the spacing of the cells.
+    """Measures the spacing of the cells, over the wave speed there.
 
     Args:
         m: number of cells.
@@ -34,7 +35,7 @@ class Spacing:
         self.kernels = (self._kernel,)
 
     def shrinkage(self, nodes, auxiliary) -> float:
-        """The least spacing over the least one at the first call, between `SMALLEST` and 1."""
+        """The least time of a wave from node to node over the one at the first call, between `SMALLEST` and 1."""
         device = self._spacing.device
         wp.launch(self._kernel, self._spacing.shape[0], [nodes, auxiliary], [self._spacing], device=device)
         smallest = float(np.min(self._spacing.numpy()))
@@ -65,6 +66,6 @@ def _spacing_kernel(continuum: Continuum, precision: Precision):
         for _ in range(DOUBLINGS):
             power = power * power
             power = power / wp.trace(power)
-        result[a] = real(1.0) / wp.sqrt(wp.trace(stiff * power))
+        result[a] = wp.sqrt(auxiliary.density[a] / wp.trace(stiff * power))
 
     return spacing

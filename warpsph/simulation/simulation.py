@@ -68,7 +68,7 @@ class Simulation:
 
     @property
     def time_step_limit(self) -> float:
-        """Largest Δt the scene now allows [s]: less than at the start where nodes have come closer."""
+        """Largest Δt the scene now allows [s]: less than at the start where nodes are closer, or waves faster."""
         return self._initial_limit * self._stepper.shrinkage
 
     def step(self, time_step: float | None = None) -> None:

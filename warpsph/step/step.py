@@ -36,7 +36,7 @@ class Stepper:
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
-        shrinkage: least spacing of the nodes over the initial one, at most 1, as of the last list.
+        shrinkage: least time of a wave from node to node over the initial one, at most 1, as of the last list.
         list_builds: how often the pair lists were built.
     """
 
@@ -91,14 +91,16 @@ class Stepper:
             dt: time step [s].
         """
         self._sources.half_step(self.nodes, self.history, t, 0.5 * dt)  # 1-2
+        self.conditions.turn(self.nodes, 0.5 * dt)
         self.to_auxiliary(dt)  # 3-6
         self.to_nodes(t + 0.5 * dt, dt)  # 7-10
         self._sources.half_step(self.nodes, self.history, t + 0.5 * dt, 0.5 * dt)  # 11-12
+        self.conditions.turn(self.nodes, 0.5 * dt)
         self.conditions.apply(self.nodes, t + dt, number, self._health)  # 13
         self._motion.move(self.nodes, self.auxiliary, dt)  # 14
         if self._motion.lists_outdated():
             self._build_lists()
-        self.conditions.follow(self.nodes, dt)
+        self.conditions.follow(self.nodes)
 
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
