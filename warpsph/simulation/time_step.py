@@ -16,10 +16,11 @@ ROUNDING = 1e-9
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 3), for the compatible scheme at most 1."""
+    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 4), for the compatible scheme at most 1."""
     numerics, precision = scene.numerics, PRECISIONS["float64"]
     weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    moment = second_moment(weight, precision, numerics.smoothing_ratio, KERNELS[numerics.kernel].support)
+    support, dim = KERNELS[numerics.kernel].support, scene.lattice.dim
+    moment = second_moment(weight, precision, numerics.smoothing_ratio, support, dim)
     limit = 2.0 * math.sqrt(moment)
     return min(limit, 1.0) if numerics.unloads else limit
 
