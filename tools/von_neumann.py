@@ -1,25 +1,27 @@
-"""Von Neumann analysis of one step on an endless lattice: stability, dispersion and damping of every velocity scheme.
+"""Von Neumann analysis of a step on an endless lattice: stability, dispersion, damping of every velocity scheme.
 
 python tools/von_neumann.py                                     # three sheets in runs/von_neumann
 python tools/von_neumann.py --kernel wendland_c2 --smoothing-ratio 1.0 --poisson-ratio 0.45
 python tools/von_neumann.py --limits                            # largest stable Courant numbers instead
 
-In units of the lattice (Δx = ρ = c_p = 1, so that Δt is the Courant number C) a step multiplies a wave exp(i k·x) of
-φ = (v, σ) by a matrix. Every difference of a lattice is i times a real symbol, so with σ/i as the unknown the matrix is
-real. With S the symbol of a Shepard value, g that of a corrected gradient, R(g) that of −div f,
+In units of the lattice (Δx = ρ = c_p = 1, so that Δt is the Courant number C) a step multiplies a wave exp(i k·x)
+of φ = (v, σ) by a matrix. Every difference of a lattice is i times a real symbol, so with σ/i as the unknown the
+matrix is real. With S the symbol of a Shepard value, g that of a corrected gradient, R(g) that of −div f,
 
     blanc-pastor, taylor:  φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same, or ← 2 S v_aux − v
     compatible:            φ ← φ + C R(D) φ + (C²/2) R(g)² φ − θ χ φ + ¼ (1 − C²) (bulk viscosity) g g·v
 
 with D the mean over a node's cells of their gradients, a share κ of the way to the corner, and χ the checkerboard.
-Weights, shares and coefficients are the package's. The front viscosity's sensor is not linear: it is 0 or full here.
-A picture's phase speed is the numerical over the exact one, its loss what a wave loses of its amplitude in a period.
+Weights, shares and coefficients are the package's. The sensor of the front viscosity is not linear: here a share
+of it, from none to full, acts everywhere, in the pictures none. Phase speeds are the numerical over the exact one,
+the loss is of the amplitude in a period. tests/test_stability.py holds these matrices against the code.
 """
 
 import argparse
 import itertools
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +41,18 @@ COURANT = (0.3, 0.5, 0.8, 0.95)
 STABLE = 1.0 + 1e-9
 COLOURS = {"compatible": "#1f77b4", "taylor": "#d62728", "blanc-pastor": "#7f7f7f"}
 LINES = (":", "-.", "--", "-")
+
+
+@cache
+def neighbours(dim: int, kernel: str, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The lattice points around the middle of a cell inside the support (P, d) and their W and −W′/ξ (P,)."""
+    precision, support = PRECISIONS["float64"], KERNELS[kernel].support
+    weigh, reach = SMOOTHING_FUNCTIONS[kernel](precision), int(np.ceil(ratio * support))
+    x = np.array(list(itertools.product(np.arange(-reach, reach) + 0.5, repeat=dim)))
+    s = (x**2).sum(axis=1) / ratio**2
+    inside = s < EDGE * support**2
+    w, g = np.array([[float(part) for part in weigh(precision.real(one))] for one in s[inside]]).T
+    return x[inside], w, g
 
 
 @dataclass(frozen=True)
@@ -65,15 +79,8 @@ class Lattice:
         return 1.0 - 2.0 * shear, shear
 
     def sweep(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Symbols of the Shepard value (K,) and, over i, of the corrected gradient (K, d) at wave vectors (K, d)."""
-        support, weigh = KERNELS[self.kernel].support, SMOOTHING_FUNCTIONS[self.kernel](PRECISIONS["float64"])
-        reach = int(np.ceil(self.ratio * support))
-        line = np.arange(-reach, reach) + 0.5
-        x = np.array(list(itertools.product(line, repeat=self.dim)))
-        s = (x**2).sum(axis=1) / self.ratio**2
-        inside = s < EDGE * support**2
-        x = x[inside]
-        w, g = np.array([[float(part) for part in weigh(PRECISIONS["float64"].real(one))] for one in s[inside]]).T
+        """Symbols of the value (K,) and, over i, of the corrected gradient (K, d) at wave vectors (K, d)."""
+        x, w, g = neighbours(self.dim, self.kernel, self.ratio)
         phase = k @ x.T
         return np.cos(phase) @ w / w.sum(), np.sin(phase) @ (g[:, None] * x) / (g @ x[:, 0] ** 2)
 
@@ -160,8 +167,8 @@ def largest_courant(lattice: Lattice, scheme: str, viscosity: float = 0.0, n: in
 def curves(lattice: Lattice, scheme: str, courant: float, kind: str, direction: np.ndarray, per_wave: np.ndarray):
     """Phase speed over the exact one and loss of amplitude in an exact period, of a P or S wave.
 
-    Along an axis or a diagonal, symmetry keeps a wave's polarisation and the stress that goes with it: its step is a
-    2 × 2 matrix.
+    Along an axis or a diagonal, symmetry keeps a wave's polarisation and the stress that goes with it: its step
+    is a 2 × 2 matrix.
 
     Args:
         direction: unit vector along an axis or a diagonal.
@@ -223,12 +230,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--kernel", default="gaussian", help=f"of {', '.join(KERNELS)}")
     parser.add_argument("--smoothing-ratio", type=float, help="h/Δx; the kernel's own unless given")
     parser.add_argument("--poisson-ratio", type=float, default=0.3, help="ν, from 0 to below 0.5")
-    parser.add_argument("--limits", action="store_true", help="print the largest stable Courant numbers, draw nothing")
+    parser.add_argument(
+        "--limits", action="store_true", help="print the largest stable Courant numbers, draw nothing"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs/von_neumann"), help="folder of the pictures")
     options = parser.parse_args(arguments)
     try:
         if not 0.0 <= options.poisson_ratio < 0.5:
-            raise ValueError(f"--poisson-ratio = {options.poisson_ratio} is not allowed: it must be from 0 to below 0.5")
+            raise ValueError(
+                f"--poisson-ratio = {options.poisson_ratio} is not allowed: it must be from 0 to below 0.5"
+            )
         numerics = Numerics(kernel=options.kernel, smoothing_ratio=options.smoothing_ratio)
         lattices = [Lattice(d, numerics.kernel, numerics.smoothing_ratio, options.poisson_ratio) for d in CONTINUA]
         for lattice in lattices:

@@ -5,8 +5,8 @@ python tools/work_precision.py --quick              # coarse spacings only, unde
 python tools/work_precision.py --cases impact,p_mode --rungs 3
 python tools/work_precision.py --draw               # tables and pictures of what is there, run nothing
 
-Writes results.csv, a picture a case, overview.png and tables.md into --out. Interrupted, it goes on where it was; remove
-the file to measure anew. Errors repeat on any machine, wall times only on this one when nothing else runs.
+Writes results.csv, a picture a case, overview.png and tables.md into --out. Interrupted, it goes on where it was;
+remove the file to measure anew. Errors repeat on any machine, wall times only on one that does nothing else.
 """
 
 import argparse

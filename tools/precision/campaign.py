@@ -51,9 +51,13 @@ def members(cases: Iterable[str], rungs: int | None, quick: bool) -> list[tuple[
     for name in cases:
         case = CASES[name]
         spacings = case.spacings[: case.quick if quick else None][:rungs]
-        ladders += [(k, name, spacing, case.flows) for k, spacing in enumerate(spacings)]
+        ladders += [(k, name, spacing) for k, spacing in enumerate(spacings)]
     ladders.sort(key=lambda rung: rung[0])
-    return [(name, setting) for _, name, spacing, flows in ladders for setting in variants(spacing, flows)]
+    return [
+        (name, setting)
+        for _, name, spacing in ladders
+        for setting in variants(spacing, CASES[name].flows, CASES[name].ratios)
+    ]
 
 
 def run(plan: Iterable[tuple[str, Setting]], path: Path, device: str, say: Callable[[str], None]) -> list[Result]:

@@ -10,10 +10,10 @@ import numpy as np
 from warpsph import Box, Elastic, Free, History, Numerics, Roller, Scene, Simulation, edge
 from warpsph.cli.catalogue import SceneFile, load
 
-from .settings import Setting
+from .settings import EXACT_RATIO, Setting
 
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
-SMALL = 1e-4  # impact velocity over the wave speed
+SMALL = 1e-4  # impact velocity over the wave speed; velocity of the pulse in the bar [m/s]
 TRANSITS = 10.25  # of the elastic bar: the pulse then stands in the bar's middle half
 
 
@@ -25,6 +25,7 @@ class Case:
         title: what it is.
         measure: what its error is.
         flows: whether the sources matter.
+        ratios: h/Δx of the Gaussian to try beside its own.
         spacings: the ladder of spacings [m], coarse to fine.
         quick: how many of them the quick form takes.
         run: (setting, device) → simulation that has run, error [-].
@@ -33,6 +34,7 @@ class Case:
     title: str
     measure: str
     flows: bool
+    ratios: tuple[float, ...]
     spacings: tuple[float, ...]
     quick: int
     run: Callable[[Setting, str], tuple[Simulation, float]]
@@ -83,9 +85,12 @@ def _shipped(name: str, setting: Setting, device: str, **changes: float) -> Run:
 
 
 def _elastic_bar(setting: Setting, device: str):
-    """Scene `elastic_bar` after 10¼ passages; d'Alembert's v = Σ f(t − (2n + 1)L/c ± x/c) with f the pull."""
+    """Scene `elastic_bar` after 10¼ passages; d'Alembert's v = Σ f(t − (2n + 1)L/c ± x/c) with f the pull.
+
+    Pulled more slowly than in the paper, whose 1 m/s strains the bar enough to shift the fronts in ten passages.
+    """
     transit = 0.005  # of the bar of 1 m [s]
-    run = _shipped("elastic_bar", setting, device, duration=TRANSITS * transit)
+    run = _shipped("elastic_bar", setting, device, duration=TRANSITS * transit, velocity=SMALL)
     x, t = run.simulation.lattice.nodes[:, 0], run.simulation.time
 
     def pull(at):
@@ -95,9 +100,9 @@ def _elastic_bar(setting: Setting, device: str):
         arrivals = [(2 * n + 1) * transit for n in range(int(TRANSITS) // 2 + 1)]
         return sum(pull(t - a + x * transit) - pull(t - a - x * transit) for a in arrivals)
 
-    tiny = 1e-6 * setting.spacing  # a node on a jump has the mean of its two sides
-    difference = run.simulation.field("velocity")[:, 0] - 0.5 * (exact(x - tiny) + exact(x + tiny))
-    return run.simulation, float(np.abs(difference).mean())
+    velocity, tiny = run.simulation.field("velocity")[:, 0] / SMALL, 1e-6 * setting.spacing
+    off_jump = exact(x - tiny) == exact(x + tiny)
+    return run.simulation, float(np.abs(velocity - exact(x))[off_jump].mean())
 
 
 def _perzyna_bar(setting: Setting, device: str):
@@ -150,16 +155,32 @@ def _numerics(setting: Setting) -> Numerics:
 
 BARS = tuple(1.0 / n for n in (50, 100, 200, 400, 800))
 SQUARES = tuple(1.0 / n for n in (10, 20, 40, 80))
+RATIOS = (0.55, 0.8)
+BAR_RATIOS = (EXACT_RATIO, 0.8)
 L2 = "of the velocity after two periods, L2, relative"
 LOAD = "of the mean load, against the exact limit load"
 CASES = {
-    "p_mode": Case("Standing P mode", L2, False, SQUARES, 2, _mode("P")),
-    "s_mode": Case("Standing S mode", L2, False, SQUARES, 2, _mode("S")),
-    "elastic_bar": Case("Elastic bar, 10¼ passages", "of the velocity, L1, of 1 m/s", False, BARS, 2, _elastic_bar),
-    "perzyna_bar": Case("Perzyna bar", "of the stress, RMS, of ρ c v₀", True, BARS, 2, _perzyna_bar),
-    "impact": Case(
-        "Impact of two elastic halves", "of the velocity, L1, of the impact velocity", False, BARS[1:], 2, _impact
+    "p_mode": Case("Standing P mode", L2, False, RATIOS, SQUARES, 2, _mode("P")),
+    "s_mode": Case("Standing S mode", L2, False, RATIOS, SQUARES, 2, _mode("S")),
+    "elastic_bar": Case(
+        "Elastic bar, 10¼ passages",
+        "of the velocity, L1, of the pulse's",
+        False,
+        BAR_RATIOS,
+        BARS,
+        2,
+        _elastic_bar,
     ),
-    "strip_footing": Case("Strip footing", LOAD, True, (0.5, 0.25, 0.125), 1, _strip_footing),
-    "vertical_cut": Case("Vertical cut", LOAD, True, (1.0, 0.5, 0.25), 1, _vertical_cut),
+    "perzyna_bar": Case("Perzyna bar", "of the stress, RMS, of ρ c v₀", True, BAR_RATIOS, BARS, 2, _perzyna_bar),
+    "impact": Case(
+        "Impact of two elastic halves",
+        "of the velocity, L1, of the impact velocity",
+        False,
+        RATIOS,
+        BARS[1:],
+        2,
+        _impact,
+    ),
+    "strip_footing": Case("Strip footing", LOAD, True, RATIOS, (0.5, 0.25, 0.125), 1, _strip_footing),
+    "vertical_cut": Case("Vertical cut", LOAD, True, RATIOS, (1.0, 0.5, 0.25), 1, _vertical_cut),
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from warpsph.scene.numerics import VELOCITY_SCHEMES
 
@@ -79,7 +79,9 @@ def _schemes(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
 def _others(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
     default = Setting(1.0)
     same = [
-        r for r in results if (r.setting.velocity_scheme, r.setting.courant) == (default.velocity_scheme, default.courant)
+        r
+        for r in results
+        if (r.setting.velocity_scheme, r.setting.courant) == (default.velocity_scheme, default.courant)
     ]
     names = list({r.setting.varies(): None for r in same})
     colours = iter(OTHERS)
@@ -97,7 +99,15 @@ def _draw(panel, results: Sequence[Result], cost: str, **style):
 
 
 def _dress(panel) -> None:
+    """Logarithmic axes of a decade at least, errors in per cent, and lines at the errors of the tables."""
     panel.set(xscale="log", yscale="log")
+    for get, put in ((panel.get_xlim, panel.set_xlim), (panel.get_ylim, panel.set_ylim)):
+        low, high = get()
+        middle = (low * high) ** 0.5
+        put(min(low, middle / 4.0), max(high, middle * 4.0))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.yaxis.set_minor_formatter(NullFormatter())
+    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g} %"))
     low, high = panel.get_ylim()
     for threshold in THRESHOLDS:

@@ -1,4 +1,4 @@
-"""What is varied: all velocity schemes at all Courant numbers, and one other choice at a time from the defaults."""
+"""What is varied: velocity scheme and Courant number together, else one choice at a time from the defaults."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, astuple, dataclass, fields, replace
@@ -6,8 +6,8 @@ from itertools import product
 
 from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
 
-COURANT = (0.4, 0.8, 0.95, 1.0)
-RATIOS = (0.55, 0.8)  # of the Gaussian, beside its own
+COURANT = (0.4, 0.8, 0.9, 1.0)
+EXACT_RATIO = 0.5  # h/Δx of the Gaussian with the nearest neighbours only: at C = 1 a bar's waves are exact
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,9 @@ class Setting:
             return self.kernel
         if self.smoothing_ratio != default.smoothing_ratio:
             return f"h = {self.smoothing_ratio:g} Δx"
-        changed = [name for name in ("source_scheme", "precision") if getattr(self, name) != getattr(default, name)]
+        changed = [
+            name for name in ("source_scheme", "precision") if getattr(self, name) != getattr(default, name)
+        ]
         return ", ".join(getattr(self, name) for name in changed)
 
     def __str__(self) -> str:
@@ -60,7 +62,7 @@ def parse(texts: dict[str, str]) -> Setting:
     return Setting(**{name: kinds[name](texts[name]) for name in NAMES})
 
 
-def variants(spacing: float, flows: bool) -> Iterator[Setting]:
+def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator[Setting]:
     """Every setting at one spacing; of source schemes only where sources matter."""
     base = Setting(spacing)
     for scheme, courant in product(VELOCITY_SCHEMES, COURANT):
@@ -68,8 +70,11 @@ def variants(spacing: float, flows: bool) -> Iterator[Setting]:
     for kernel in KERNELS:
         if kernel != base.kernel:
             yield replace(base, kernel=kernel, smoothing_ratio=KERNELS[kernel].smoothing_ratio)
-    for ratio in RATIOS:
+    for ratio in ratios:
         yield replace(base, smoothing_ratio=ratio)
+    if EXACT_RATIO in ratios:
+        for scheme in VELOCITY_SCHEMES:
+            yield replace(base, velocity_scheme=scheme, courant=1.0, smoothing_ratio=EXACT_RATIO)
     yield replace(base, precision="float32")
     if flows:
         yield replace(base, source_scheme="rk4")

@@ -10,8 +10,8 @@ from .drawing import THRESHOLDS
 from .settings import Setting
 
 PEERS = """\
-Others on the impact, 200 / 800 columns: LAMMPS 3.6 / 1.5 %, SPHinXsys 5.6 / 2.0 %, GeoTaichi 5.9 / 2.6 % of the impact
-velocity."""
+Others on the impact, 200 / 800 columns: LAMMPS 3.6 / 1.5 %, SPHinXsys 5.6 / 2.0 %, GeoTaichi 5.9 / 2.6 % of the
+impact velocity."""
 
 
 def tables(results: Mapping[Case, Sequence[Result]]) -> str:
@@ -34,8 +34,8 @@ def tables(results: Mapping[Case, Sequence[Result]]) -> str:
 def _legend() -> str:
     base = Setting(1.0)
     return (
-        f"In %, by spacing Δx [m]. Unless a row says otherwise: {base.velocity_scheme}, C = {base.courant:g}, {base.kernel}, "
-        f"h = {base.smoothing_ratio:g} Δx, {base.source_scheme} sources, {base.precision}."
+        f"In %, by spacing Δx [m]. Unless a row says otherwise: {base.kernel}, h = {base.smoothing_ratio:g} Δx, "
+        f"{base.source_scheme} sources, {base.precision}. A dash: not run, the reason is at the end."
     )
 
 
