@@ -13,6 +13,7 @@ from .cases import CASES
 from .settings import NAMES, Setting, parse, variants
 
 FIGURES = ("nodes", "steps", "node_steps", "wall_s", "error")
+REPEAT_BELOW = 1.0  # [s]; the first steps of a process with new kernels are slow, and weigh in short runs
 HEAD = ("case", *NAMES, *FIGURES, "why")
 
 
@@ -85,6 +86,9 @@ def _member(case: str, setting: Setting, device: str) -> Result:
     begin = time.perf_counter()
     try:
         simulation, error = CASES[case].run(setting, device)
+        wall_time = simulation.wall_time
+        if wall_time < REPEAT_BELOW:
+            wall_time = min(wall_time, CASES[case].run(setting, device)[0].wall_time)
     except WarpSPHError as refused:
         return _failed(case, setting, begin, str(refused))
     except Exception as broken:  # a member must not end the campaign
@@ -92,7 +96,7 @@ def _member(case: str, setting: Setting, device: str) -> Result:
     nodes, steps = len(simulation.lattice.nodes), simulation.steps
     if not math.isfinite(error):
         return _failed(case, setting, begin, f"the error is {error}")
-    return Result(case, setting, nodes, steps, nodes * steps, simulation.wall_time, error)
+    return Result(case, setting, nodes, steps, nodes * steps, wall_time, error)
 
 
 def _failed(case: str, setting: Setting, begin: float, why: str) -> Result:

@@ -1,6 +1,7 @@
 """Pictures of the results: error against cost."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,7 +16,7 @@ from .settings import COURANT, Setting
 
 COLOURS = dict(zip(VELOCITY_SCHEMES, ("#1f77b4", "#7f7f7f", "#d62728"), strict=True))
 LINES = dict(zip(COURANT, ((":", "s"), ("-", "o"), ("--", "^"), ("-.", "D")), strict=True))
-OTHERS = ("#d62728", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2")
+OTHERS = ("#d62728", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22", "#17becf")
 COSTS = (("node_steps", "node-steps"), ("wall_s", "wall time [s]"))
 THRESHOLDS = (0.05, 0.01, 0.001)
 
@@ -77,19 +78,18 @@ def _schemes(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
 
 
 def _others(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
-    default = Setting(1.0)
-    same = [
-        r
-        for r in results
-        if (r.setting.velocity_scheme, r.setting.courant) == (default.velocity_scheme, default.courant)
-    ]
-    names = list({r.setting.varies(): None for r in same})
-    colours = iter(OTHERS)
-    lines = {}
-    for name in names:
-        style = {"color": next(colours) if name else COLOURS[default.velocity_scheme], "marker": "o"}
-        lines[name or "defaults"] = [r for r in same if r.setting.varies() == name], style
-    return lines
+    """The defaults, and what differs in more than scheme and Courant number."""
+    default, colours, lines = Setting(1.0).label(), cycle(OTHERS), {}
+    for result in results:
+        name = result.setting.label()
+        if name != default and not result.setting.varies():
+            continue
+        if name not in lines:
+            colour = COLOURS["compatible"] if name == default else next(colours)
+            label = f"defaults: {name}" if name == default else name
+            lines[name] = [], {"color": colour, "marker": "o", "label": label}
+        lines[name][0].append(result)
+    return {style.pop("label"): (rows, style) for rows, style in lines.values()}
 
 
 def _draw(panel, results: Sequence[Result], cost: str, **style):

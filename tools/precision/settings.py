@@ -48,9 +48,12 @@ class Setting:
         ]
         return ", ".join(getattr(self, name) for name in changed)
 
+    def label(self) -> str:
+        """All of it but the spacing."""
+        return ", ".join(filter(None, (self.velocity_scheme, f"C = {self.courant:g}", self.varies())))
+
     def __str__(self) -> str:
-        parts = [self.velocity_scheme, f"C = {self.courant:g}", self.varies(), f"Δx = {self.spacing:.4g}"]
-        return ", ".join(part for part in parts if part)
+        return f"{self.label()}, Δx = {self.spacing:.4g}"
 
 
 NAMES = tuple(field.name for field in fields(Setting))

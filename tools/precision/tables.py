@@ -44,8 +44,9 @@ def _errors(results: Sequence[Result]) -> str:
     lines: dict[str, dict[float, str]] = {}
     for result in results:
         setting = result.setting
-        name = ", ".join(filter(None, (setting.velocity_scheme, f"C = {setting.courant:g}", setting.varies())))
-        lines.setdefault(name, {})[setting.spacing] = "-" if result.why else f"{100.0 * result.error:.3g}"
+        lines.setdefault(setting.label(), {})[setting.spacing] = (
+            "-" if result.why else f"{100.0 * result.error:.3g}"
+        )
     rows = [(name, *(line.get(spacing, "") for spacing in spacings)) for name, line in lines.items()]
     return table(("setting", *(f"{spacing:.4g}" for spacing in spacings)), rows)
 
