@@ -7,6 +7,7 @@ times the vector from the target to the neighbour.
 
 import math
 from functools import cache
+from itertools import product
 
 import warp as wp
 
@@ -64,17 +65,19 @@ def wendland_c2(precision: Precision) -> wp.Function:
 SMOOTHING_FUNCTIONS = {"gaussian": gaussian, "cubic_spline": cubic_spline, "wendland_c2": wendland_c2}
 
 
-def second_moment(weight: wp.Function, precision: Precision, ratio: float, support: float) -> float:
+def second_moment(weight: wp.Function, precision: Precision, ratio: float, support: float, dim: int) -> float:
     """m₂ = Σ W x²/Σ W over the lattice points at ±½, ±3/2, … inside the support, in units of Δx² [-].
 
-    The wave part of the step is stable for c_p Δt/Δx ≤ 2 √m₂ (METHOD section 3). Taken along a lattice row, as
-    the bar sees it.
+    The wave part of the step is stable for c_p Δt/Δx ≤ 2 √m₂ (METHOD section 4). Only the Gaussian, a product
+    of functions along the axes, has nearly the same m₂ in every dimension.
 
     Args:
         weight: one of `SMOOTHING_FUNCTIONS` in the given precision.
         ratio: h/Δx.
         support: radius of the support over h.
+        dim: number of space dimensions.
     """
-    points = [k + 0.5 for k in range(math.ceil(ratio * support)) if k + 0.5 < ratio * support]
-    weights = [float(weight(precision.real((x / ratio) ** 2))[0]) for x in points]
-    return sum(w * x * x for w, x in zip(weights, points, strict=True)) / sum(weights)
+    row = [k + 0.5 for k in range(math.ceil(ratio * support))]
+    points = [x for x in product(row, repeat=dim) if sum(c * c for c in x) < (ratio * support) ** 2]
+    weights = [float(weight(precision.real(sum(c * c for c in x) / ratio**2))[0]) for x in points]
+    return sum(w * x[0] ** 2 for w, x in zip(weights, points, strict=True)) / sum(weights)

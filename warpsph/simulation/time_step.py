@@ -13,15 +13,22 @@ from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
 ROUNDING = 1e-9
+# On an endless lattice the compatible scheme is stable up to 1. Where sums lack neighbours on one side it is up to
+# 0.96, in a free square of 3 × 3 cells with ν = 0.499 up to 0.94; small boxes grow by up to 1.4 % a step at 1.
+EDGE_LIMIT = 0.9
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 3), for the compatible scheme at most 1."""
+    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 4), for the compatible scheme 1 in a bar,
+    else `EDGE_LIMIT`."""
     numerics, precision = scene.numerics, PRECISIONS["float64"]
     weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    moment = second_moment(weight, precision, numerics.smoothing_ratio, KERNELS[numerics.kernel].support)
+    support, dim = KERNELS[numerics.kernel].support, scene.lattice.dim
+    moment = second_moment(weight, precision, numerics.smoothing_ratio, support, dim)
     limit = 2.0 * math.sqrt(moment)
-    return min(limit, 1.0) if numerics.unloads else limit
+    if numerics.unloads:
+        return min(limit, 1.0 if dim == 1 else EDGE_LIMIT)
+    return limit
 
 
 def time_step_limit(scene: Scene) -> float:

@@ -1,0 +1,1 @@
+"""Accuracy against cost: cases with exact solutions, over the choices of the discretisation."""

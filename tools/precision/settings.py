@@ -1,0 +1,83 @@
+"""What is varied: velocity scheme and Courant number together, else one choice at a time from the defaults."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, astuple, dataclass, fields, replace
+from itertools import product
+
+from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
+
+COURANT = (0.4, 0.8, 0.9, 1.0)
+EXACT_RATIO = 0.5  # h/Δx of the Gaussian with the nearest neighbours only: at C = 1 a bar's waves are exact
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One choice of the discretisation.
+
+    Attributes:
+        spacing: [m].
+        velocity_scheme, courant, kernel, smoothing_ratio, source_scheme: as in `Numerics`.
+        precision: float32 or float64.
+    """
+
+    spacing: float
+    velocity_scheme: str = Numerics.velocity_scheme
+    courant: float = Numerics.courant
+    kernel: str = Numerics.kernel
+    smoothing_ratio: float = KERNELS[Numerics.kernel].smoothing_ratio
+    source_scheme: str = Numerics.source_scheme
+    precision: str = "float64"
+
+    def numerics(self) -> dict:
+        """The arguments of `Numerics`."""
+        return {name: value for name, value in asdict(self).items() if name not in ("spacing", "precision")}
+
+    def texts(self) -> tuple[str, ...]:
+        """The values as a CSV file holds them."""
+        return tuple(str(value) for value in astuple(self))
+
+    def varies(self) -> str:
+        """What sets it apart from the defaults, besides scheme, Courant number and spacing."""
+        default = Setting(self.spacing, self.velocity_scheme, self.courant)
+        if self.kernel != default.kernel:
+            return self.kernel
+        if self.smoothing_ratio != default.smoothing_ratio:
+            return f"h = {self.smoothing_ratio:g} Δx"
+        changed = [
+            name for name in ("source_scheme", "precision") if getattr(self, name) != getattr(default, name)
+        ]
+        return ", ".join(getattr(self, name) for name in changed)
+
+    def label(self) -> str:
+        """All of it but the spacing."""
+        return ", ".join(filter(None, (self.velocity_scheme, f"C = {self.courant:g}", self.varies())))
+
+    def __str__(self) -> str:
+        return f"{self.label()}, Δx = {self.spacing:.4g}"
+
+
+NAMES = tuple(field.name for field in fields(Setting))
+
+
+def parse(texts: dict[str, str]) -> Setting:
+    """The setting of a row of a CSV file."""
+    kinds = {field.name: field.type for field in fields(Setting)}
+    return Setting(**{name: kinds[name](texts[name]) for name in NAMES})
+
+
+def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator[Setting]:
+    """Every setting at one spacing; of source schemes only where sources matter."""
+    base = Setting(spacing)
+    for scheme, courant in product(VELOCITY_SCHEMES, COURANT):
+        yield replace(base, velocity_scheme=scheme, courant=courant)
+    for kernel in KERNELS:
+        if kernel != base.kernel:
+            yield replace(base, kernel=kernel, smoothing_ratio=KERNELS[kernel].smoothing_ratio)
+    for ratio in ratios:
+        yield replace(base, smoothing_ratio=ratio)
+    if EXACT_RATIO in ratios:
+        for scheme in VELOCITY_SCHEMES:
+            yield replace(base, velocity_scheme=scheme, courant=1.0, smoothing_ratio=EXACT_RATIO)
+    yield replace(base, precision="float32")
+    if flows:
+        yield replace(base, source_scheme="rk4")

@@ -1,0 +1,261 @@
+"""Von Neumann analysis of a step on an endless lattice: stability, dispersion, damping of every velocity scheme.
+
+python tools/von_neumann.py                                     # three sheets in runs/von_neumann
+python tools/von_neumann.py --kernel wendland_c2 --smoothing-ratio 1.0 --poisson-ratio 0.45
+python tools/von_neumann.py --limits                            # largest stable Courant numbers instead
+
+In units of the lattice (Δx = ρ = c_p = 1, so that Δt is the Courant number C) a step multiplies a wave exp(i k·x)
+of φ = (v, σ) by a matrix. Every difference of a lattice is i times a real symbol, so with σ/i as the unknown the
+matrix is real. With S the symbol of a Shepard value, g that of a corrected gradient, R(g) that of −div f,
+
+    blanc-pastor, taylor:  φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same, or ← 2 S v_aux − v
+    compatible:            φ ← φ + C R(D) φ + (C²/2) R(g)² φ − θ χ φ + ¼ (1 − C²) (bulk viscosity) g g·v
+
+with D the mean over a node's cells of their gradients, a share κ of the way to the corner, and χ the checkerboard.
+Weights, shares and coefficients are the package's. The sensor of the front viscosity is not linear: here a share
+of it, from none to full, acts everywhere, in the pictures none. Phase speeds are the numerical over the exact one,
+the loss is of the amplitude in a period. tests/test_stability.py holds these matrices against the code.
+"""
+
+import argparse
+import itertools
+import sys
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from warpsph.errors import WarpSPHError
+from warpsph.ground.precision import PRECISIONS
+from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
+from warpsph.operators.shock import STRENGTH
+from warpsph.operators.sweep import EDGE
+from warpsph.scene.dimension import CONTINUA
+from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
+from warpsph.step.compatible import STRESS_SHARE, VELOCITY_SHARE, corner_share
+
+COURANT = (0.3, 0.5, 0.8, 0.95)
+STABLE = 1.0 + 1e-9
+COLOURS = {"compatible": "#1f77b4", "taylor": "#d62728", "blanc-pastor": "#7f7f7f"}
+LINES = (":", "-.", "--", "-")
+
+
+@cache
+def neighbours(dim: int, kernel: str, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The lattice points around the middle of a cell inside the support (P, d) and their W and −W′/ξ (P,)."""
+    precision, support = PRECISIONS["float64"], KERNELS[kernel].support
+    weigh, reach = SMOOTHING_FUNCTIONS[kernel](precision), int(np.ceil(ratio * support))
+    x = np.array(list(itertools.product(np.arange(-reach, reach) + 0.5, repeat=dim)))
+    s = (x**2).sum(axis=1) / ratio**2
+    inside = s < EDGE * support**2
+    w, g = np.array([[float(part) for part in weigh(precision.real(one))] for one in s[inside]]).T
+    return x[inside], w, g
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """An endless lattice of spacing 1 with both sets of nodes.
+
+    Args:
+        dim: number of dimensions.
+        kernel, ratio: smoothing function and h/Δx.
+        poisson_ratio: ν; without meaning in a bar.
+    """
+
+    dim: int
+    kernel: str = "gaussian"
+    ratio: float = KERNELS["gaussian"].smoothing_ratio
+    poisson_ratio: float = 0.3
+
+    @property
+    def moduli(self) -> tuple[float, float]:
+        """λ and G over λ + 2G."""
+        if self.dim == 1:
+            return 0.0, 0.5
+        shear = (1.0 - 2.0 * self.poisson_ratio) / (2.0 * (1.0 - self.poisson_ratio))
+        return 1.0 - 2.0 * shear, shear
+
+    def sweep(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Symbols of the value (K,) and, over i, of the corrected gradient (K, d) at wave vectors (K, d)."""
+        x, w, g = neighbours(self.dim, self.kernel, self.ratio)
+        phase = k @ x.T
+        return np.cos(phase) @ w / w.sum(), np.sin(phase) @ (g[:, None] * x) / (g @ x[:, 0] ** 2)
+
+    def cells(self, k: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
+        """Symbols over i of the mean gradient of a node's cells, κ of the way to it, (K, d), less its middle part,
+        and of the checkerboard (K,)."""
+        sine, cosine = np.sin(0.5 * k), np.cos(0.5 * k)
+        gradient, checkerboard = np.zeros_like(k), np.zeros(len(k))
+        for size in range(2, self.dim + 1):
+            for axes in itertools.combinations(range(self.dim), size):
+                rest = np.prod(np.delete(cosine, axes, axis=1) ** 2, axis=1)
+                checkerboard += np.prod(sine[:, axes] ** 2, axis=1) * rest
+                for a in axes:
+                    others = [b for b in axes if b != a]
+                    mixed = np.prod(sine[:, others] ** 2, axis=1) * rest
+                    gradient[:, a] += 2.0 * share ** (size - 1) * sine[:, a] * cosine[:, a] * mixed
+        return gradient, checkerboard
+
+    def rate(self, g: np.ndarray) -> np.ndarray:
+        """−div f for gradients i g (K, d), as real matrices (K, n, n) of (v, σ/i)."""
+        (lame, shear), d = self.moduli, self.dim
+        pairs = [(i, j) for i, j in CONTINUA[d].pairs if max(i, j) < d]
+        matrix = np.zeros((len(g), d + len(pairs), d + len(pairs)))
+        for row, (i, j) in enumerate(pairs, start=d):
+            matrix[:, i, row] -= g[:, j]
+            if i == j:
+                matrix[:, row, :d] += lame * g
+                matrix[:, row, i] += 2.0 * shear * g[:, i]
+            else:
+                matrix[:, j, row] -= g[:, i]
+                matrix[:, row, i] += shear * g[:, j]
+                matrix[:, row, j] += shear * g[:, i]
+        return matrix
+
+    def step(self, k: np.ndarray, scheme: str, courant: float, viscosity: float = 0.0) -> np.ndarray:
+        """The matrices (K, n, n) of one step at wave vectors (K, d).
+
+        Args:
+            k: wave vectors [1/Δx].
+            scheme: velocity scheme.
+            courant: c_p Δt/Δx.
+            viscosity: share of the compatible scheme's front viscosity that acts, 0 to 1.
+        """
+        value, g = self.sweep(k)
+        wave, d = self.rate(g), self.dim
+        one = np.broadcast_to(np.eye(wave.shape[1]), wave.shape)
+        if scheme != "compatible":
+            auxiliary = value[:, None, None] * one + 0.5 * courant * wave
+            full = one + courant * wave @ auxiliary
+            if scheme == "blanc-pastor":
+                full[:, :d] = (2.0 * value[:, None, None] * auxiliary - one)[:, :d]
+            return full
+        corner, checkerboard = self.cells(k, corner_share(courant, d))
+        mean = g * np.prod(np.cos(0.5 * k), axis=1)[:, None] + corner
+        theta = np.where(np.arange(wave.shape[1]) < d, VELOCITY_SHARE, STRESS_SHARE) * checkerboard[:, None]
+        full = one + courant * self.rate(mean) + 0.5 * courant**2 * wave @ wave - theta[:, :, None] * one
+        front = viscosity * STRENGTH * max(1.0 - courant**2, 0.0) / 4.0
+        full[:, :d, :d] -= front * g[:, :, None] * g[:, None, :]
+        return full
+
+
+def wave_vectors(dim: int, n: int) -> np.ndarray:
+    """Wave vectors (K, d) with n values from 0 to π along an axis, one of each set that symmetry makes equal."""
+    line = np.linspace(0.0, np.pi, n)
+    return np.array(list(itertools.combinations_with_replacement(line, dim)))[1:]
+
+
+def spectral_radius(lattice: Lattice, scheme: str, courant: float, viscosity: float = 0.0, n: int = 17) -> float:
+    """The largest growth of any wave in one step."""
+    matrices = lattice.step(wave_vectors(lattice.dim, n), scheme, courant, viscosity)
+    return float(np.abs(np.linalg.eigvals(matrices)).max())
+
+
+def largest_courant(lattice: Lattice, scheme: str, viscosity: float = 0.0, n: int = 17) -> float:
+    """The Courant number up to which no wave grows, to 10⁻³; 0 when waves grow at any."""
+    low, high = 0.0, 2.0
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        stable = spectral_radius(lattice, scheme, middle, viscosity, n) <= STABLE
+        low, high = (middle, high) if stable else (low, middle)
+    return low
+
+
+def curves(lattice: Lattice, scheme: str, courant: float, kind: str, direction: np.ndarray, per_wave: np.ndarray):
+    """Phase speed over the exact one and loss of amplitude in an exact period, of a P or S wave.
+
+    Along an axis or a diagonal, symmetry keeps a wave's polarisation and the stress that goes with it: its step
+    is a 2 × 2 matrix.
+
+    Args:
+        direction: unit vector along an axis or a diagonal.
+        per_wave: cells per wavelength (K,).
+    """
+    number = 2.0 * np.pi / per_wave
+    across = np.eye(lattice.dim)[-1] - direction[-1] * direction
+    if np.linalg.norm(across) < 1e-12 and lattice.dim > 1:
+        across = np.eye(lattice.dim)[0]
+    polarisation = direction if kind == "P" else across / np.linalg.norm(across)
+    exact = lattice.rate(direction[None])[0]
+    start = np.zeros(len(exact))
+    start[: lattice.dim] = polarisation
+    pair = np.stack([start, exact @ start], axis=1)
+    speed = float(np.sqrt(-start @ exact @ exact @ start))
+    matrices = lattice.step(number[:, None] * direction, scheme, courant)
+    roots = np.linalg.eigvals(np.linalg.pinv(pair) @ matrices @ pair)
+    root = np.take_along_axis(roots, np.abs(roots).argmax(axis=1)[:, None], axis=1)[:, 0]
+    exact_angle = speed * number * courant
+    return np.abs(np.angle(root)) / exact_angle, 1.0 - np.abs(root) ** (2.0 * np.pi / exact_angle)
+
+
+def sheet(lattice: Lattice, path: Path) -> Path:
+    """Draw dispersion above damping, a column for each wave and direction."""
+    d = lattice.dim
+    axis, diagonal = np.eye(d)[0], np.ones(d) / np.sqrt(d)
+    columns = [("P", "along an axis", axis)]
+    if d > 1:
+        columns += [("P", "diagonal", diagonal), ("S", "along an axis", axis), ("S", "diagonal", diagonal)]
+    figure = Figure(figsize=(2.0 + 3.4 * len(columns), 7.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(2, len(columns), squeeze=False, sharex=True, sharey="row")
+    per_wave = np.geomspace(3.0, 60.0, 200)
+    for (kind, where, direction), (above, below) in zip(columns, grid.T, strict=True):
+        for scheme, (courant, line) in itertools.product(COLOURS, zip(COURANT, LINES, strict=True)):
+            speed, loss = curves(lattice, scheme, courant, kind, direction, per_wave)
+            style = {"color": COLOURS[scheme], "linestyle": line, "linewidth": 1.3}
+            above.plot(per_wave, speed, label=f"{scheme}, C = {courant:g}", **style)
+            below.plot(per_wave, np.maximum(loss, 1e-7), **style)
+        above.set(title=f"{kind} wave, {where}", xscale="log", ylim=(0.8, 1.1))
+        below.set(yscale="log", ylim=(1e-6, 1.0), xlabel="cells per wavelength")
+        below.set_xticks([3, 5, 10, 20, 40, 60], labels=["3", "5", "10", "20", "40", "60"])
+        below.minorticks_off()
+        for panel in (above, below):
+            panel.grid(alpha=0.3)
+    grid[0, 0].set_ylabel("phase speed over the exact one")
+    grid[1, 0].set_ylabel("loss of amplitude a period")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9 if d > 1 else 7)
+    nu = f", ν = {lattice.poisson_ratio:g}" if d > 1 else ""
+    figure.suptitle(f"{d}D, {lattice.kernel}, h = {lattice.ratio:g} Δx{nu}")
+    figure.savefig(path, dpi=110)
+    return path
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command; 0, or 2 for bad input."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kernel", default="gaussian", help=f"of {', '.join(KERNELS)}")
+    parser.add_argument("--smoothing-ratio", type=float, help="h/Δx; the kernel's own unless given")
+    parser.add_argument("--poisson-ratio", type=float, default=0.3, help="ν, from 0 to below 0.5")
+    parser.add_argument(
+        "--limits", action="store_true", help="print the largest stable Courant numbers, draw nothing"
+    )
+    parser.add_argument("--out", type=Path, default=Path("runs/von_neumann"), help="folder of the pictures")
+    options = parser.parse_args(arguments)
+    try:
+        if not 0.0 <= options.poisson_ratio < 0.5:
+            raise ValueError(
+                f"--poisson-ratio = {options.poisson_ratio} is not allowed: it must be from 0 to below 0.5"
+            )
+        numerics = Numerics(kernel=options.kernel, smoothing_ratio=options.smoothing_ratio)
+        lattices = [Lattice(d, numerics.kernel, numerics.smoothing_ratio, options.poisson_ratio) for d in CONTINUA]
+        for lattice in lattices:
+            numerics.check_support(CONTINUA[lattice.dim])
+        if options.limits:
+            for lattice, scheme in itertools.product(lattices, VELOCITY_SCHEMES):
+                print(f"{lattice.dim}D {scheme}: {largest_courant(lattice, scheme):.3f}")
+            return 0
+        options.out.mkdir(parents=True, exist_ok=True)
+        for lattice in lattices:
+            print(sheet(lattice, options.out / f"{lattice.dim}d.png"))
+    except (WarpSPHError, ValueError, OSError) as error:
+        print(f"von_neumann: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
