@@ -13,6 +13,7 @@ from warpsph.ground.precision import PRECISIONS
 from warpsph.nodes.node_sets import node_types
 from warpsph.operators.cells import cell_types, cells_of_nodes
 from warpsph.operators.shock import ROUGH, front_pressure
+from warpsph.operators.sweep import sweep
 from warpsph.scene import CONTINUA
 
 DIMENSIONS = [1, 2, 3]
@@ -51,6 +52,7 @@ class Seen:
     value: np.ndarray  # at each node: mean over its cells of their means
     gradient: np.ndarray
     checkerboard: np.ndarray
+    frame: np.ndarray
 
 
 @cache
@@ -82,12 +84,14 @@ def probes(dim, precision):
         values: wp.array(dtype=phi),
         gradients: wp.array(dtype=phi_gradient),
         checkerboards: wp.array(dtype=phi),
+        frames: wp.array(dtype=types.tensor),
     ):
         i = wp.tid()
-        value, gradient, checkerboard = gather(i, cells, auxiliary.point, share)
+        value, gradient, checkerboard, frame = gather(i, cells, auxiliary.point, share)
         values[i] = value
         gradients[i] = gradient
         checkerboards[i] = checkerboard
+        frames[i] = frame
 
     return describe_all, gather_all, types, cell_of
 
@@ -110,7 +114,8 @@ def see(lattice, field, precision, middle_gradient=None, share=1.0):
     wp.launch(
         describe_all, m, [wp.array(points, dtype=Point, device="cpu"), gradients, auxiliary, cells], device="cpu"
     )
-    outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in (phi, phi_gradient, phi)]
+    written = (phi, phi_gradient, phi, types.tensor)
+    outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
     wp.launch(gather_all, n, [auxiliary, cells, share], outputs, device="cpu")
     modes = cells.cell.numpy()["modes"].reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
@@ -215,6 +220,48 @@ def test_a_folded_cell_has_no_frame():
     seen = see(lattice.with_nodes(nodes), field, "float64", given)
     np.testing.assert_allclose(seen.gradient, 1.0)
     np.testing.assert_allclose(seen.modes[0, :, 0], field.T @ [0.25, -0.25, -0.25, 0.25])
+    np.testing.assert_array_equal(seen.frame, 0.0)
+
+
+def mean_edges(corners):
+    """∂x/∂ξ_a in column a: the mean of the differences along each axis; corners (2ᵈ, d)."""
+    dim = corners.shape[1]
+    grid = corners.reshape((2,) * dim + (dim,))
+    return np.stack([np.diff(grid, axis=a).reshape(-1, dim).mean(axis=0) for a in range(dim)], axis=1)
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_the_frame_of_a_node_is_the_mean_of_its_cells(precision, dim):
+    """∇ξ of a parallelepiped is the inverse of its edges, all over a sheared lattice; of others the mean."""
+    tolerance = 10 * ROUNDING[precision]
+    lattice, F = sheared(box(dim))
+    seen = see(lattice, np.zeros((len(lattice.nodes), size_of(dim))), precision)
+    np.testing.assert_allclose(seen.frame, np.tile(np.linalg.inv(F), (len(lattice.nodes), 1, 1)), atol=tolerance)
+    lattice = distorted(box(dim))
+    seen = see(lattice, np.zeros((len(lattice.nodes), size_of(dim))), precision)
+    frames = np.array([np.linalg.inv(mean_edges(corners)) for corners in lattice.nodes[lattice.cells]])
+    np.testing.assert_allclose(seen.frame, mean_over_cells(lattice, frames), atol=tolerance)
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_kernels_follow_the_frame_and_are_round_without_one(precision, dim):
+    """M = ∇ξ/(h/Δx), which a node at ξ from the middle sees at |ξ|/(h/Δx); 1/h for the zero frame."""
+    continuum, real = CONTINUA[dim], PRECISIONS[precision]
+    tensor = node_types(continuum, real).tensor
+    metric_of = sweep(continuum, real, "gaussian").cell_metric(0.6)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def probe(frames: wp.array(dtype=tensor), h: real.real, metrics: wp.array(dtype=tensor)):
+        i = wp.tid()
+        metrics[i] = metric_of(frames[i], h)
+
+    _, F = sheared(box(dim))
+    frames = wp.array(np.array([np.linalg.inv(F), np.zeros((dim, dim))]), dtype=tensor, device="cpu")
+    metrics = wp.zeros(2, dtype=tensor, device="cpu")
+    wp.launch(probe, 2, [frames, 0.25], [metrics], device="cpu")
+    stretched, plain = metrics.numpy().reshape(2, dim, dim)
+    np.testing.assert_allclose(stretched @ F, np.eye(dim) / 0.6, atol=10 * ROUNDING[precision])
+    np.testing.assert_allclose(plain, 4.0 * np.eye(dim), atol=10 * ROUNDING[precision])
 
 
 # ---------------------------------------------------------------------------------------------------------

@@ -90,8 +90,7 @@ def state_of(simulation):
 
 
 def compatible_state_of(simulation):
-    smoothing_length = simulation.auxiliary.smoothing_length.numpy().astype(float)
-    return state_of(simulation) | {"u": simulation.field("displacement").astype(float), "aux_h": smoothing_length}
+    return state_of(simulation) | {"u": simulation.field("displacement").astype(float)}
 
 
 def bare_normals(lattice):
@@ -121,6 +120,7 @@ def model_of(scene):
         "H": MATERIAL.hardening,
         "r": MATERIAL.residual_ratio,
         "V0": volume,
+        "smoothing_ratio": numerics.smoothing_ratio,
         "h0": numerics.smoothing_ratio * np.sqrt(volume),
         "cells": scene.lattice.cells,
         "kernel": numerics.kernel,

@@ -10,6 +10,7 @@ A cell's corners are numbered 00, 01, 10, 11 along its own axes (1, 2).
 import numpy as np
 
 from tests.reference.slow_step import (
+    De,
     components,
     div_f,
     full,
@@ -49,6 +50,18 @@ def thickness(corners):
     """The smaller distance between opposite sides, sides taken parallel to the axes."""
     axes = axes_of(corners)
     return abs(np.linalg.det(axes)) / max(np.linalg.norm(axes[0]), np.linalg.norm(axes[1]))
+
+
+def frame_of(corners):
+    """∇ξ_a in row a."""
+    return np.linalg.inv(axes_of(corners).T)
+
+
+def stretched_gradient(place, frame, own, source, phi, model):
+    """Corrected gradient about the value `own` there: round kernels of radius h/Δx in the coordinates ξ."""
+    target = {"x": [frame @ place], "h": [model["smoothing_ratio"]]}
+    seen = {"x": source["x"] @ frame.T, "V": source["V"]}
+    return gradient(target, 0, own, seen, phi, model["kernel"]) @ frame
 
 
 def linear_fit(corners, f):
@@ -189,20 +202,33 @@ def corner_share(courant):
     return float(np.clip(1.0 - courant**2 + 2.0 * theta / (16.0 * courant**2), 0.0, 0.5))
 
 
-def cells_half_step(x, nodes, aux, v_s, sigma_s, L, dt, courant, model):
+def stress_change(sigma, eps, grad_v, L_smooth, dt, model):
+    """δσ in a cell: smooth strain and flow for Δt/2, then the rest of the strain, elastic."""
+
+    def elastic(L):
+        L3 = in_space(L)
+        return 0.5 * dt * De(0.5 * (L3 + L3.T), model)
+
+    flowed, _ = relax(full(sigma) + elastic(L_smooth), eps, 0.5 * dt, model)
+    return components(flowed + elastic(grad_v - L_smooth)) - sigma
+
+
+def cells_half_step(x, nodes, aux, v_s, sigma_s, eps_s, L, dt, courant, model):
     """Steps 3-6: for each cell ∇φ, its checkerboard, its axes' gradients ∇ξ, and δφ."""
     phi_s = np.hstack([v_s, sigma_s])
     found = []
     for C, members in enumerate(model["cells"]):
         corners, rho = [x[i] for i in members], aux["rho"][C]
         mean, _, checkerboard = linear_fit(corners, phi_s[members])
-        grad = gradient(aux, C, mean, nodes, phi_s, model["kernel"])
-        div_v, div_sigma = div_f(grad[:2], grad[2:], rho, model)
+        frame = frame_of(corners)
+        grad = stretched_gradient(aux["x"][C], frame, mean, nodes, phi_s, model)
+        div_v, _ = div_f(grad[:2], grad[2:], rho, model)
+        smooth, eps = (sum(part[i] for i in members) / 4.0 for part in (L, eps_s))
         q = bulk_viscous_pressure(
             grad[0, 0] + grad[1, 1], [L[i, 0, 0] + L[i, 1, 1] for i in members], corners, rho, dt, courant
         )
-        change = -0.5 * dt * np.append(div_v, div_sigma) + q * np.array([0.0, 0.0, 1.0, 1.0, 0.0, 1.0])
-        frame = np.linalg.inv(axes_of(corners).T)  # ∇ξ_a in row a
+        pressed = stress_change(mean[2:], eps, grad[:2], smooth, dt, model) + q * np.array([1.0, 1.0, 0.0, 1.0])
+        change = np.append(-0.5 * dt * div_v, pressed)
         found.append((grad, checkerboard, frame, change))
     return found
 
@@ -221,6 +247,7 @@ def nodes_full_step(nodes, aux, cells, v_s, sigma_s, t, dt, courant, model):
     adv, L_new = np.zeros((n, 6)), np.zeros((n, 2, 2))
     for i in range(n):
         grad, seen = np.zeros((6, 2)), np.zeros(6)
+        own_frame = sum(cells[C][2] for C, _ in around[i]) / len(around[i])
         for C, k in around[i]:
             cell_grad, checkerboard, frame, _ = cells[C]
             grad += cell_grad / len(around[i])
@@ -228,7 +255,7 @@ def nodes_full_step(nodes, aux, cells, v_s, sigma_s, t, dt, courant, model):
                 along = 2.0 * checkerboard * kappa * ENDS[k, b]
                 grad += np.outer(along, frame[a]) / len(around[i])
             seen += ALTERNATING[k] * checkerboard / len(around[i])
-        grad += gradient(nodes, i, half[i] - phi_s[i], aux, changes, model["kernel"])
+        grad += stretched_gradient(nodes["x"][i], own_frame, half[i] - phi_s[i], aux, changes, model)
         rho = nodes["rho"][i]
         if not model["small_strain"]:
             stretch = np.eye(2) + 0.5 * dt * grad[:2]
@@ -246,12 +273,12 @@ def nodes_full_step(nodes, aux, cells, v_s, sigma_s, t, dt, courant, model):
 # ---------------------------------------------------------------------------------------------------------
 
 
-def configuration(x, rho, aux_h, model):
+def configuration(x, rho, model):
     """Nodes and cells. Where nodes move, a cell's density is that of its own volume, otherwise its nodes' mean."""
     V = model["V0"] * model["rho0"] / rho
-    nodes = {"x": x, "rho": rho, "V": V, "h": model["h0"] * np.sqrt(model["rho0"] / rho)}
+    nodes = {"x": x, "rho": rho, "V": V}
     m = len(model["cells"])
-    aux = {"x": np.zeros((m, 2)), "rho": np.zeros(m), "V": np.zeros(m), "h": aux_h}
+    aux = {"x": np.zeros((m, 2)), "rho": np.zeros(m), "V": np.zeros(m)}
     for C, members in enumerate(model["cells"]):
         aux["x"][C] = sum(x[i] for i in members) / 4.0
         if model["small_strain"]:
@@ -276,13 +303,13 @@ def densities(x, model):
 def slow_compatible_step(state: dict, model: dict, t: float, dt: float) -> dict:
     """The state at t + dt from the state at t; the input is not changed.
 
-    Besides what `slow_step` needs: displacements `u`, which x is too coarse for in float32, and `aux_h` of cells.
+    Besides what `slow_step` needs: displacements `u`, which x is too coarse for in float32.
     """
     x, L = state["x"], state["L"]
     courant = dt * model["wave_speed"] / model["spacing"]
-    nodes, aux = configuration(x, state["rho"], state["aux_h"], model)
+    nodes, aux = configuration(x, state["rho"], model)
     v_s, sigma_s, eps_s = sources(state["v"], state["sigma"], state["eps"], L, t, 0.5 * dt, model)
-    cells = cells_half_step(x, nodes, aux, v_s, sigma_s, L, dt, courant, model)
+    cells = cells_half_step(x, nodes, aux, v_s, sigma_s, eps_s, L, dt, courant, model)
     v_adv, sigma_adv, v_half, L_new = nodes_full_step(nodes, aux, cells, v_s, sigma_s, t, dt, courant, model)
     v, sigma, eps = sources(v_adv, sigma_adv, eps_s, L_new, t + 0.5 * dt, 0.5 * dt, model)
     v, sigma = boundary_conditions(v, sigma, t + dt, model)
