@@ -41,7 +41,8 @@ class Numerics:
 
     Args:
         kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
-        smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given.
+        smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given. With
+            `compatible` keep the support below 2.12 Δx: see docs/velocity_steps.md, "What still fails".
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
         velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the
             published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
