@@ -113,8 +113,8 @@ def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device:
 def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     """h₀ [m], shape (n,): (smoothing ratio) · (V₀)^{1/d}, the ratio times the local spacing.
 
-    In the compatible scheme the ratio times the largest stretch of its cells: kernels are stretched with them
-    there, and the pair lists must hold all that they see.
+    In the compatible scheme the ratio times the largest stretch of the node's cells, since kernels are stretched
+    with them and the pair lists must hold all that they see.
     """
     lattice, ratio = scene.lattice, scene.numerics.smoothing_ratio
     if scene.numerics.velocity_scheme != "compatible":
