@@ -77,7 +77,7 @@ def test_a_member_that_breaks_is_kept_and_the_others_run(monkeypatch, tmp_path):
     def broken(setting, device):
         raise RuntimeError("two\nlines")
 
-    monkeypatch.setitem(CASES, "broken", Case("Broken", "none", False, (), (1.0,), 1, broken))
+    monkeypatch.setitem(CASES, "broken", Case("Broken", "none", False, (), (1.0,), 1, 0.0, broken))
     plan = [("broken", Setting(1.0)), ("perzyna_bar", Setting(0.02))]
     results = run(plan, tmp_path / "results.csv", "cpu", lambda text: None)
     assert results[0].why == "RuntimeError: two lines" and math.isnan(results[0].error)

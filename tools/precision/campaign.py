@@ -13,7 +13,7 @@ from .cases import CASES
 from .settings import NAMES, Setting, parse, variants
 
 FIGURES = ("nodes", "steps", "node_steps", "wall_s", "error")
-REPEAT_BELOW = 1.0  # [s]; the first steps of a process with new kernels are slow, and weigh in short runs
+REPEAT_BELOW = 0.2  # [s]; the first steps of a process with new kernels are slow, and weigh in short runs
 HEAD = ("case", *NAMES, *FIGURES, "why")
 
 

@@ -30,10 +30,11 @@ def sheet(case: Case, results: Sequence[Result], path: Path) -> Path:
         for panel, (cost, label) in zip(panels, COSTS, strict=True):
             for name, (rows, style) in lines.items():
                 _draw(panel, rows, cost, label=name, **style)
-            _dress(panel)
             panel.set_xlabel(label)
         if lines:
             panels[1].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    for panel in grid.ravel():
+        _dress(panel, case.floor)
     for panel in grid[:, 0]:
         panel.set_ylabel("error")
     figure.suptitle(f"{case.title}: error {case.measure}")
@@ -52,7 +53,7 @@ def overview(results: Mapping[Case, Sequence[Result]], path: Path) -> Path:
     for panel, (case, members) in zip(panels, results.items(), strict=False):
         for name, (line, style) in _schemes(members).items():
             drawn[name] = _draw(panel, line, "node_steps", **style)
-        _dress(panel)
+        _dress(panel, case.floor)
         panel.set_title(case.title, fontsize=10)
     for panel in panels[len(results) :]:
         panel.set_axis_off()
@@ -98,13 +99,15 @@ def _draw(panel, results: Sequence[Result], cost: str, **style):
     return panel.plot(x, y, linewidth=1.3, markersize=4, **style)[0]
 
 
-def _dress(panel) -> None:
-    """Logarithmic axes of a decade at least, errors in per cent, and lines at the errors of the tables."""
+def _dress(panel, floor: float) -> None:
+    """Logarithmic axes of a decade at least, errors in per cent and not far below the case's floor, lines at the
+    errors of the tables."""
     panel.set(xscale="log", yscale="log")
     for get, put in ((panel.get_xlim, panel.set_xlim), (panel.get_ylim, panel.set_ylim)):
         low, high = get()
         middle = (low * high) ** 0.5
         put(min(low, middle / 4.0), max(high, middle * 4.0))
+    panel.set_ylim(bottom=max(panel.get_ylim()[0], 0.2 * floor))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

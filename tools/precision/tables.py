@@ -55,7 +55,7 @@ def _cheapest(results: Mapping[Case, Sequence[Result]]) -> str:
     rows = []
     for case, members in results.items():
         good = [result for result in members if not result.why]
-        for wanted in THRESHOLDS:
+        for wanted in (threshold for threshold in THRESHOLDS if threshold >= case.floor):
             reached = [result for result in good if result.error <= wanted]
             label = case.title, f"{100.0 * wanted:g} %"
             if not reached:

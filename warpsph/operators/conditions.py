@@ -9,6 +9,8 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.kinematics import kinematics
+from ..ground.linear_algebra import rotation_of
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.node_sets import NodeTypes, node_types
@@ -22,8 +24,8 @@ class ConditionTypes:
 
     Attributes:
         Table: struct of arrays: `row` (n,), the row of each node or −1; P, Π, amplitudes and functions a row,
-            and `drive`, the present value of each function of time.
-        apply: (node, φ, Table) → φ after v ← P v + Σ a_k f_k, σ ← Π σ.
+            `drive`, the present value of each function of time, and `turned`, the rotation R of Π's directions.
+        apply: (node, φ, Table) → φ after v ← P v + Σ a_k f_k, σ ← R Π(Rᵀ σ R) Rᵀ.
     """
 
     Table: type
@@ -35,7 +37,7 @@ def condition_types(continuum: Continuum, precision: Precision) -> ConditionType
     """The table and the function of one continuum in one precision."""
     types, phi = node_types(continuum, precision), unknowns(continuum, precision)
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    vector, real = types.vector, precision.real
+    vector, real, transform = types.vector, precision.real, kinematics(continuum, precision).transform
     stress_matrix = precision.mat(continuum.stress_size, continuum.stress_size)
 
     @wp.struct
@@ -46,6 +48,7 @@ def condition_types(continuum: Continuum, precision: Precision) -> ConditionType
         amplitude: wp.array2d(dtype=vector)
         function: wp.array2d(dtype=wp.int32)
         drive: wp.array(dtype=real)
+        turned: wp.array(dtype=types.tensor)
 
     @wp.func
     def apply(i: int, values: phi.phi, table: Table):
@@ -55,7 +58,9 @@ def condition_types(continuum: Continuum, precision: Precision) -> ConditionType
         v = table.velocity_projector[row] * velocity_of(values)
         for k in range(table.amplitude.shape[1]):
             v += table.drive[table.function[row, k]] * table.amplitude[row, k]
-        return join(v, table.stress_projector[row] * stress_of(values))
+        R = table.turned[row]
+        left = table.stress_projector[row] * transform(stress_of(values), wp.transpose(R))
+        return join(v, transform(left, R))
 
     return ConditionTypes(Table, apply)
 
@@ -66,6 +71,7 @@ class Conditions:
     Args:
         boundary: the resolved conditions.
         n: number of material nodes.
+        turns: whether the directions of edges that nobody moves turn with their nodes.
 
     Attributes:
         types: types of the table and its function.
@@ -74,14 +80,23 @@ class Conditions:
     """
 
     def __init__(
-        self, boundary: BoundaryTable, n: int, continuum: Continuum, precision: Precision, device: wp.Device
+        self,
+        boundary: BoundaryTable,
+        n: int,
+        continuum: Continuum,
+        precision: Precision,
+        device: wp.Device,
+        turns: bool = False,
     ):
         types = node_types(continuum, precision)
         self.types = condition_types(continuum, precision)
         self.table = self.types.Table()
         self._functions = boundary.functions
         self._kernel = apply_kernel(continuum, precision, self.types)
-        self.kernels = (self._kernel,)
+        self._turns = wp.array(np.flatnonzero(~boundary.moved) if turns else [], dtype=wp.int32, device=device)
+        self._node = wp.array(boundary.nodes, dtype=wp.int32, device=device)
+        self._turn = turn_kernel(continuum, precision, self.types)
+        self.kernels = (self._kernel, self._turn)
         row = np.full(n, -1, dtype=np.int32)
         row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
         self._fill(row, boundary, types, continuum, precision, device)
@@ -95,6 +110,7 @@ class Conditions:
         table.velocity_projector = array(boundary.velocity_projector, types.tensor)
         table.stress_projector = array(boundary.stress_projector, precision.mat(size, size))
         rows, terms = boundary.function.shape
+        table.turned = array(np.tile(np.eye(continuum.dim), (rows, 1, 1)), types.tensor)
         table.amplitude = wp.zeros((rows, terms), dtype=types.vector, device=device)
         table.function = wp.zeros((rows, terms), dtype=wp.int32, device=device)
         if terms:
@@ -111,7 +127,10 @@ class Conditions:
         """Nothing: all conditions are on nodes chosen once and for all."""
 
     def turn(self, nodes, dt: float) -> None:
-        """Nothing: their directions stay the initial ones."""
+        """Turn the directions of edges that nobody moves as the stresses turn in the same time."""
+        if self._turns.shape[0]:
+            inputs = [nodes, self._turns, self._node, dt, self.table]
+            wp.launch(self._turn, self._turns.shape[0], inputs=inputs, device=self._turns.device)
 
     def follow(self, nodes) -> None:
         """Nothing."""
@@ -152,3 +171,23 @@ def apply_kernel(continuum: Continuum, precision: Precision, conditions: Conditi
             health[1] = step
 
     return apply_conditions
+
+
+@cache
+def turn_kernel(continuum: Continuum, precision: Precision, conditions: ConditionTypes):
+    """The kernel that turns the directions of some rows with the spin of their nodes."""
+    MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
+    Table, rotation = conditions.Table, rotation_of(continuum.dim, precision)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def turn(
+        nodes: MaterialNodes,
+        turns: wp.array(dtype=wp.int32),
+        node: wp.array(dtype=wp.int32),
+        dt: real,
+        table: Table,
+    ):
+        row = turns[wp.tid()]
+        table.turned[row] = rotation(nodes.velocity_gradient[node[row]], dt) * table.turned[row]
+
+    return turn

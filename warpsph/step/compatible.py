@@ -33,7 +33,7 @@ from ..scene.scene import Scene
 # θ: shares of the checkerboard taken off the velocity and the stress in a step. The velocity's costs little: with
 # 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
 VELOCITY_SHARE = 1.0
-STRESS_SHARE = 0.3
+STRESS_SHARE = 0.1
 MARGIN = 0.9
 
 

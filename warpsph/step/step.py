@@ -68,7 +68,8 @@ class Stepper:
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
         self._sources = sources(scene, law, self._parameters, precision)
         if scene.free_surface is None:
-            self.conditions = Conditions(scene.boundary, n, continuum, precision, device)
+            turns = numerics.unloads and scene.large_displacements and lattice.dim > 1
+            self.conditions = Conditions(scene.boundary, n, continuum, precision, device, turns)
         else:
             self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, device)
         self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
