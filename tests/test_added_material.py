@@ -4,9 +4,22 @@ import numpy as np
 import pytest
 from pxr import Usd
 
-from warpsph import Box, Checkpoint, Frames, FrameWriter, Numerics, Scene, SceneError, Simulation, write_checkpoint
+from warpsph import (
+    Box,
+    Checkpoint,
+    Fixed,
+    Frames,
+    FrameWriter,
+    Numerics,
+    Scene,
+    SceneError,
+    Simulation,
+    edge,
+    write_checkpoint,
+)
 from warpsph.export.usd import write_stage
 from warpsph.ground.materials import LAWS
+from warpsph.scene.dimension import CONTINUA
 from warpsph.scene.document import decode, encode
 from warpsph.scene.fingerprint import fingerprint
 
@@ -14,13 +27,14 @@ TIME, SHEAR = 0.01, 1e6 / 2.6  # τ [s], G [Pa]
 
 
 def relaxing(law, size, **numerics):
-    """A uniform stress that relaxes for two relaxation times; a shear, but in a bar."""
+    """A uniform stress that relaxes for two relaxation times, held at all edges; a shear, but in a bar."""
     shear = {1: (1e3,), 2: (0.0, 0.0, 1e3, 0.0), 3: (0.0, 0.0, 0.0, 1e3, 0.0, 0.0)}[len(size)]
     return Scene(
         shape=Box(size, 0.25),
         material=law.Maxwell(young_modulus=1e6, poisson_ratio=0.3, density=2000.0, relaxation_time=TIME),
         stress=lambda *x: shear,
         duration=2.0 * TIME,
+        conditions=[Fixed(edge(name)) for name in CONTINUA[len(size)].edges],
         large_displacements=False,
         numerics=Numerics(**numerics),
     )

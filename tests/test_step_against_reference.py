@@ -90,7 +90,10 @@ def state_of(simulation):
 
 
 def compatible_state_of(simulation):
-    return state_of(simulation) | {"u": simulation.field("displacement").astype(float)}
+    table = simulation._stepper.conditions.table
+    row, turned = table.row.numpy(), table.turned.numpy().astype(float)
+    angle = np.where(row >= 0, np.arctan2(turned[row, 1, 0], turned[row, 0, 0]), 0.0)
+    return state_of(simulation) | {"u": simulation.field("displacement").astype(float), "angle": angle}
 
 
 def bare_normals(lattice):

@@ -78,7 +78,7 @@ def probe_kernel(dim, precision, kernel):
     """A kernel that writes the value and the gradient of one sweep."""
     continuum, real = CONTINUA[dim], PRECISIONS[precision]
     types, parts = node_types(continuum, real), sweep(continuum, real, kernel)
-    collect, value, gradient = parts.collect, parts.value, parts.gradient
+    collect, value, gradient, round_metric = parts.collect, parts.value, parts.gradient, parts.round_metric
     Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -93,7 +93,7 @@ def probe_kernel(dim, precision, kernel):
         gradients: wp.array(dtype=matrix),
     ):
         i = wp.tid()
-        sums = collect(i, x[i], h[i], base, pairs, sources)
+        sums = collect(i, x[i], round_metric(h[i]), base, pairs, sources)
         values[i] = value(sums)
         gradients[i] = gradient(sums, own[i])
 

@@ -111,8 +111,17 @@ def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device:
 
 
 def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
-    """h₀ = (smoothing ratio) · (V₀)^{1/d} [m], shape (n,): the ratio times the local spacing."""
-    return scene.numerics.smoothing_ratio * volume ** (1.0 / scene.lattice.dim)
+    """h₀ [m], shape (n,): (smoothing ratio) · (V₀)^{1/d}, the ratio times the local spacing.
+
+    In the compatible scheme the ratio times the largest stretch of the node's cells, since kernels are stretched
+    with them and the pair lists must hold all that they see.
+    """
+    lattice, ratio = scene.lattice, scene.numerics.smoothing_ratio
+    if scene.numerics.velocity_scheme != "compatible":
+        return ratio * volume ** (1.0 / lattice.dim)
+    stretch, largest = np.linalg.norm(lattice.cell_jacobians(), 2, axis=(1, 2)), np.zeros(len(volume))
+    np.maximum.at(largest, lattice.cells, stretch[:, None])
+    return ratio * largest
 
 
 def material_history(n: int, law: Law, precision: Precision, device: wp.Device) -> wp.array | None:

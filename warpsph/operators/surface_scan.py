@@ -116,7 +116,7 @@ class SurfaceScan:
         row[candidates] = np.arange(b, dtype=np.int32)
         self.row = wp.array(row, dtype=wp.int32, device=device)
         self.candidates = _candidates(candidates, continuum, types, precision, device)
-        self._ratio = scene.free_surface.scan_ratio / scene.numerics.smoothing_ratio
+        self._ratio = scene.free_surface.scan_ratio
         spacing = scene.lattice.spacing
         self._around = Neighbours(continuum, precision, self.candidates, nodes, SCAN_SUPPORT, spacing, skin=0.0)
         self.pairs = self._around.pairs
@@ -163,8 +163,8 @@ def _gather_kernel(continuum: Continuum, precision: Precision):
         c = wp.tid()
         i = candidates.node[c]
         candidates.point[c] = nodes.point[i]
-        # h is the smoothing ratio times the local spacing, at all times.
-        candidates.smoothing_length[c] = ratio * nodes.smoothing_length[i]
+        spacing = wp.pow(nodes.point[i].volume, real(wp.static(1.0 / continuum.dim)))
+        candidates.smoothing_length[c] = ratio * spacing
 
     return gather
 

@@ -21,8 +21,8 @@ class FreeSurface:
     """Makes the body's edge traction-free wherever no velocity is prescribed, as it moves and deforms.
 
     Surface nodes and their normals are found anew in the current configuration (see
-    `warpsph.operators.surface_scan`), unlike those of `Free`, whose initial normals turn with their nodes' spin
-    (with a published velocity scheme they do not).
+    `warpsph.operators.surface_scan`), unlike those of `Free`, whose initial normals turn with their nodes'
+    spin (with a published velocity scheme they do not).
 
     Args:
         scan_ratio: length of the scan over the local spacing h_s/Δx [-].

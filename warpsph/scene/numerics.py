@@ -73,6 +73,11 @@ class Numerics:
         return self.velocity_scheme == "compatible"
 
     @property
+    def follows_cells(self) -> bool:
+        """Whether kernels are stretched and turned with the cells, and so reach a stretched cell's corners."""
+        return self.velocity_scheme == "compatible"
+
+    @property
     def support(self) -> float:
         """Radius of the support over spacing [-]."""
         return KERNELS[self.kernel].support * self.smoothing_ratio

@@ -125,7 +125,8 @@ class Scene:
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
         if self.free_surface is not None:
             self._check_free_surface()
-        self.numerics.check_support(self.lattice.continuum, self.lattice.largest_edge() / self.lattice.spacing)
+        stretch = self.lattice.largest_edge() / self.lattice.spacing
+        self.numerics.check_support(self.lattice.continuum, 1.0 if self.numerics.follows_cells else stretch)
         _ = self.boundary, self.initial_velocity, self.initial_stress
 
     def _check_free_surface(self) -> None:
