@@ -11,6 +11,7 @@ from warpsph import (
     Fixed,
     Free,
     NodeValue,
+    Numerics,
     Output,
     PrescribedVelocity,
     Probe,
@@ -220,7 +221,10 @@ def test_unknown_quantities_are_refused(text, message, tmp_path):
 
 def test_quantities_are_components_or_lengths(tmp_path):
     scene = block(
-        velocity=lambda x, y: (3.0 + 0.0 * x, 4.0), conditions=[], stress=lambda x, y: (1.0, 2.0, 3.0, 4.0)
+        velocity=lambda x, y: (3.0 + 0.0 * x, 4.0),
+        conditions=[],
+        stress=lambda x, y: (1.0, 2.0, 3.0, 4.0),
+        numerics=Numerics(velocity_scheme="taylor"),  # an edge without a condition keeps its tractions
     )
     FrameWriter(Simulation(scene, device="cpu"), (0.0,), tmp_path)
     frames = Frames(tmp_path)

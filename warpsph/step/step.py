@@ -63,6 +63,7 @@ class Stepper:
         search = (support, lattice.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
         centre = centre_kernel(continuum, precision)
+        load_kernels([centre], device)
         wp.launch(centre, self._m, [self.nodes, self.auxiliary], device=device)
         self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
         self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
@@ -75,7 +76,7 @@ class Stepper:
         self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
         parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion, self._spacing)
-        load_kernels([centre, *(kernel for part in parts if part for kernel in part.kernels)], device)
+        load_kernels([kernel for part in parts if part for kernel in part.kernels], device)
 
         self.list_builds, self.shrinkage = 0, 1.0
         self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
