@@ -78,6 +78,8 @@ def tell(results, picture) -> Section:
         Row("limit load, mean from 0.05 to 0.15 m", float(loads.mean()), "N", PAPER_LOADS, exact, perfect.seconds),
         Row("load at 0.05 m", float(loads[0]), "N", PAPER_LOADS, exact),
         Row("load at 0.15 m", float(loads[-1]), "N", PAPER_LOADS, exact),
+        Row("limit load over the footing's width", perfect.check("limit_load"), "N", None, exact),
+        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), "N", None, exact),
         Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), "°", 45.0, 45.0),
         Row("band angle, softening", soft.check("band_angle"), "°", 45.0, 45.0, soft.seconds),
         Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), "-", 0.73),
