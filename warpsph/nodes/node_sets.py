@@ -117,7 +117,7 @@ def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     with them and the pair lists must hold all that they see.
     """
     lattice, ratio = scene.lattice, scene.numerics.smoothing_ratio
-    if scene.numerics.velocity_scheme != "compatible":
+    if not scene.numerics.follows_cells:
         return ratio * volume ** (1.0 / lattice.dim)
     stretch, largest = np.linalg.norm(lattice.cell_jacobians(), 2, axis=(1, 2)), np.zeros(len(volume))
     np.maximum.at(largest, lattice.cells, stretch[:, None])

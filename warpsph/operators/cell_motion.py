@@ -1,9 +1,8 @@
 """Step 14 with volumes from the cells: nodes move, and densities follow from where they are.
 
-A cell's mass is constant, so its density is that mass over its volume, and a node's follows from the mean
-volume of
-its cells. Integrating dρ/dt = −ρ tr d, as published, drifts where the gradient at a node is one-sided: at a free
-edge in strong shear by tens of per cent.
+A cell's mass is constant, so its density is that mass over its volume, and a node's follows from the mean volume
+of its cells. Integrating dρ/dt = −ρ tr d, as published, drifts where the gradient at a node is one-sided: at a
+free edge in strong shear by tens of per cent.
 """
 
 from functools import cache
@@ -11,10 +10,12 @@ from functools import cache
 import warp as wp
 
 from ..ground.linear_algebra import determinant_of
+from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
-from ..scene.lattice import Lattice
-from .cells import cells_of_nodes, corner_sides
+from ..scene.scene import Scene
+from .cells import cells_of_nodes, edges_function
 from .motion import Motion
+from .spacing import Spacing
 
 # A cell that folds keeps this share of its initial volume: a density must stay positive.
 SMALLEST = 0.1
@@ -24,32 +25,33 @@ class CellMotion(Motion):
     """Moves the nodes with v^{n+1/2}; volumes, densities and smoothing lengths follow from the cells.
 
     Args:
-        lattice: the initial lattice.
-        ratio: smoothing length over spacing.
-        support, skin, reference_density, continuum, precision, device: as for `Motion`.
+        scene, skin, precision, device: as for `Motion`.
     """
 
-    def __init__(
-        self, lattice: Lattice, ratio: float, support, skin, reference_density, continuum, precision, device
-    ):
-        super().__init__(len(lattice.nodes), support, skin, reference_density, continuum, precision, device)
+    def __init__(self, scene: Scene, skin: float, precision: Precision, device: wp.Device):
+        super().__init__(scene, skin, precision, device)
+        lattice, continuum = scene.lattice, scene.lattice.continuum
         self._of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
         self._initial_volume = wp.array(lattice.cell_volumes(), dtype=precision.real, device=device)
-        self._ratio = ratio
+        self._ratio = scene.numerics.smoothing_ratio
         self._cell_h = wp.zeros(len(lattice.cells), dtype=precision.real, device=device)
         self._shift, self._measure, self._share = _kernels(continuum, precision)
-        self.kernels = (*self.kernels, self._shift, self._measure, self._share)
+        self._spacing = Spacing(len(lattice.cells), continuum, precision, device)
+        self.kernels = (self._shift, self._measure, self._share, *self._spacing.kernels)
 
     def mark(self, nodes, auxiliary) -> None:
         """Remember where the nodes are now: the pair lists were just built for this."""
         super().mark(nodes, auxiliary)
         wp.copy(self._cell_h, auxiliary.smoothing_length)
 
+    def shrinkage(self, nodes, auxiliary) -> float:
+        """Least time of a wave from node to node over the initial one, at most 1."""
+        return self._spacing.shrinkage(nodes, auxiliary)
+
     def move(self, nodes, auxiliary, dt: float) -> None:
-        """x ← x + Δt v^{n+1/2}; then V, ρ and h of the cells, then of the nodes."""
+        """x ← x + Δt v^{n+1/2}; then x, V, ρ and h of the cells, then V, ρ and h of the nodes."""
         device, n, m = nodes.point.device, nodes.point.shape[0], auxiliary.point.shape[0]
         wp.launch(self._shift, n, inputs=[dt, nodes], device=device)
-        wp.launch(self._centre, m, inputs=[nodes, auxiliary], device=device)
         inputs = [self._reference_density, self._initial_volume, self._ratio, self._support, 0.5 * self._skin]
         inputs += [self._cell_h, nodes, auxiliary, self._outdated]
         wp.launch(self._measure, m, inputs=inputs, device=device)
@@ -64,7 +66,7 @@ def _kernels(continuum, precision):
     real, vector, tensor = precision.real, types.vector, types.tensor
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
     determinant, corners = determinant_of(dim, precision), 2**dim
-    side = corner_sides(continuum, precision)
+    edges_of = edges_function(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(dt: real, nodes: MaterialNodes):
@@ -98,10 +100,11 @@ def _kernels(continuum, precision):
         outdated: wp.array(dtype=wp.int32),
     ):
         a = wp.tid()
-        edges = tensor()
+        x = vector()
         for k in range(wp.static(corners)):
-            edges += wp.outer(nodes.point[auxiliary.cell[a, k]].x, side[k])
-        edges = real(wp.static(2.0 / corners)) * edges
+            x += nodes.point[auxiliary.cell[a, k]].x
+        auxiliary.point[a].x = real(wp.static(1.0 / corners)) * x
+        edges = edges_of(a, auxiliary, nodes.point)
         h = ratio * longest(edges)
         auxiliary.smoothing_length[a] = h
         if support * wp.max(h - listed_h[a], real(0.0)) > half_skin:

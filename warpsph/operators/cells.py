@@ -62,6 +62,22 @@ def corner_sides(continuum: Continuum, precision: Precision):
 
 
 @cache
+def edges_function(continuum: Continuum, precision: Precision) -> wp.Function:
+    """(cell, auxiliary nodes, nodes) → its edges ∂x/∂ξ_a, in column a."""
+    types, corners = node_types(continuum, precision), 2**continuum.dim
+    side = corner_sides(continuum, precision)
+
+    @wp.func
+    def edges_of(a: int, auxiliary: types.AuxiliaryNodes, nodes: wp.array(dtype=types.Point)):
+        edges = types.tensor()
+        for k in range(wp.static(corners)):
+            edges += wp.outer(nodes[auxiliary.cell[a, k]].x, side[k])
+        return precision.real(wp.static(2.0 / corners)) * edges
+
+    return edges_of
+
+
+@cache
 def frame_function(continuum: Continuum, precision: Precision) -> wp.Function:
     """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
     dim, real = continuum.dim, precision.real

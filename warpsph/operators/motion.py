@@ -17,6 +17,8 @@ from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
+from ..scene.numerics import KERNELS
+from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -35,20 +37,24 @@ class NoMotion:
     def mark(self, nodes, auxiliary) -> None:
         """Nothing."""
 
+    def shrinkage(self, nodes, auxiliary) -> float:
+        """1: the spacing stays."""
+        return 1.0
+
 
 class Motion:
     """Moves the nodes with v^{n+1/2}, and tells when the pair lists have used up their skin.
 
     Args:
-        n: number of material nodes.
-        support: radius of the support in smoothing lengths.
+        scene: the scene.
         skin: skin of the pair lists [m].
-        reference_density: ρ₀ [kg/mᵈ].
     """
 
-    def __init__(self, n, support, skin, reference_density, continuum, precision, device):
+    def __init__(self, scene: Scene, skin: float, precision: Precision, device: wp.Device):
+        continuum, n = scene.lattice.continuum, len(scene.lattice.nodes)
         types = node_types(continuum, precision)
-        self._support, self._skin, self._reference_density = support, skin, reference_density
+        self._support, self._skin = KERNELS[scene.numerics.kernel].support, skin
+        self._reference_density = scene.material.density
         self._initial_smoothing_length: wp.array | None = None
         self._listed = wp.zeros(n, dtype=types.vector, device=device)
         self._listed_h = wp.zeros(n, dtype=precision.real, device=device)
@@ -68,6 +74,10 @@ class Motion:
     def lists_outdated(self) -> bool:
         """Whether some node has used up its half of the skin since `mark`."""
         return bool(self._outdated.numpy()[0])
+
+    def shrinkage(self, nodes, auxiliary) -> float:
+        """1: the published schemes keep their step, since their viscosity depends on it."""
+        return 1.0
 
     def move(self, nodes, auxiliary, dt: float) -> None:
         """x ← x + Δt v^{n+1/2}, ρ ← ρ/(change of volume), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""

@@ -14,7 +14,7 @@ import warp as wp
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
-from .cells import corner_sides, frame_function
+from .cells import edges_function, frame_function
 
 # A step is not shortened beyond this share, or a run in which cells fold would never end.
 SMALLEST = 0.25
@@ -46,18 +46,13 @@ class Spacing:
 
 @cache
 def _spacing_kernel(continuum: Continuum, precision: Precision):
-    types, real, dim = node_types(continuum, precision), precision.real, continuum.dim
-    tensor, frame_of = types.tensor, frame_function(continuum, precision)
-    corners, side = 2**dim, corner_sides(continuum, precision)
+    types, real = node_types(continuum, precision), precision.real
+    edges_of, frame_of = edges_function(continuum, precision), frame_function(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
     def spacing(nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)):
         a = wp.tid()
-        edges = tensor()
-        for k in range(wp.static(corners)):
-            edges += wp.outer(nodes.point[auxiliary.cell[a, k]].x, side[k])
-        edges = real(wp.static(2.0 / corners)) * edges
-        frame = frame_of(edges)
+        frame = frame_of(edges_of(a, auxiliary, nodes.point))
         stiff = frame * wp.transpose(frame)
         if wp.trace(stiff) <= real(0.0):
             result[a] = real(wp.inf)  # a folded cell: its kernels are round

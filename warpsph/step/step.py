@@ -17,7 +17,6 @@ from ..operators.conditions import Conditions
 from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.motion import Motion, NoMotion, centre_kernel
 from ..operators.sources import sources
-from ..operators.spacing import Spacing
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 from .fluxes import FLUXES
@@ -52,14 +51,11 @@ class Stepper:
         self._device, self._n, self._m = device, n, len(lattice.cells)
 
         support, skin = KERNELS[numerics.kernel].support, 0.0
-        self._motion, self._spacing = NoMotion(), None
+        self._motion = NoMotion()
         if scene.large_displacements:
             skin = SKIN * lattice.spacing
-            moving = (support, skin, scene.material.density, continuum, precision, device)
-            cells = numerics.velocity_scheme == "compatible"
-            self._motion = CellMotion(lattice, numerics.smoothing_ratio, *moving) if cells else Motion(n, *moving)
-            if cells:
-                self._spacing = Spacing(self._m, continuum, precision, device)
+            moving = CellMotion if numerics.follows_cells else Motion
+            self._motion = moving(scene, skin, precision, device)
         search = (support, lattice.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
         centre = centre_kernel(continuum, precision)
@@ -75,8 +71,8 @@ class Stepper:
             self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, device)
         self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
         self._health = wp.full(2, -1, dtype=wp.int32, device=device)
-        parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion, self._spacing)
-        load_kernels([kernel for part in parts if part for kernel in part.kernels], device)
+        parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion)
+        load_kernels([kernel for part in parts for kernel in part.kernels], device)
 
         self.list_builds, self.shrinkage = 0, 1.0
         self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
@@ -131,8 +127,7 @@ class Stepper:
         self._around_nodes.build()
         self._motion.mark(self.nodes, self.auxiliary)
         self.conditions.locate(self.nodes)
-        if self._spacing:
-            self.shrinkage = self._spacing.shrinkage(self.nodes, self.auxiliary)
+        self.shrinkage = self._motion.shrinkage(self.nodes, self.auxiliary)
         self.list_builds += 1
 
     def _initial_spin(self, scene: Scene) -> None:
