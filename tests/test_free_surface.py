@@ -27,6 +27,7 @@ from warpsph import (
     edge,
     where,
 )
+from warpsph.ground.launching import Launcher
 from warpsph.operators.conditions import Conditions
 from warpsph.operators.surface_scan import SurfaceScan
 
@@ -245,7 +246,9 @@ def test_scan_alone_tells_inside_from_surface(device, precision, name):
     """
     simulation = simulation_of(BODIES[name]().shape, device, precision)
     everyone = np.arange(len(simulation.lattice.nodes))
-    scan = SurfaceScan(simulation.scene, everyone, simulation.nodes, simulation.precision, simulation.device)
+    scan = SurfaceScan(
+        simulation.scene, everyone, simulation.nodes, simulation.precision, Launcher(simulation.device)
+    )
     scan.find(simulation.nodes)
     assert np.array_equal(scan.candidates.exposed.numpy() == 1, on_boundary(simulation.lattice))
 
@@ -437,7 +440,7 @@ def test_normals_follow_a_rotation(device, precision):
     x0 = simulation.lattice.nodes
     right = np.flatnonzero(np.isclose(x0[:, 0], 0.2) & (np.abs(x0[:, 1]) < 0.15))
     rim = np.flatnonzero(simulation.field("free_surface"))
-    fresh = SurfaceScan(simulation.scene, rim, simulation.nodes, simulation.precision, simulation.device)
+    fresh = SurfaceScan(simulation.scene, rim, simulation.nodes, simulation.precision, Launcher(simulation.device))
     searches, locate = [], simulation.conditions.locate
     simulation.conditions.locate = lambda nodes: (searches.append(simulation.steps), locate(nodes))
     turned, steps = 0.0, 0

@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
 
-from .building import all_cores, takes_threads
+from warpsph.simulation.device import all_cores
+
 from .machine import memory
 from .others import ADAPTERS
 from .scenes import Case
@@ -69,10 +70,6 @@ def run(plan: Plan, command: Sequence[str], out: Path, say: Callable[[str], None
         "skipped": [],
         "others": [],
     }
-    if max(plan.threads) > 1 and not takes_threads():
-        many = sorted(set(plan.threads) - {1})
-        report["skipped"].append({"threads": many, "why": "this build runs a CPU kernel on one thread only"})
-        say(f"threads {many}: skipped, {report['skipped'][0]['why']}")
     _keep(report, out)
     places = _places(plan.devices or tuple(found["devices"]), plan.threads)
     for device, threads in places:
@@ -93,8 +90,7 @@ def run(plan: Plan, command: Sequence[str], out: Path, say: Callable[[str], None
 
 def _places(devices: Iterable[str], threads: Iterable[int]) -> list[tuple[str, int]]:
     """(device, threads) to run on; a GPU has one of the latter only."""
-    counts = sorted(set(threads)) if takes_threads() else [1]
-    return [(device, count) for device in devices for count in (counts if device == "cpu" else [1])]
+    return [(device, n) for device in devices for n in (sorted(set(threads)) if device == "cpu" else [1])]
 
 
 def _series(plan: Plan, places: Iterable[tuple[str, int]]) -> list[list[Case]]:

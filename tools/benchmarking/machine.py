@@ -10,8 +10,7 @@ import numpy as np
 import warp as wp
 
 import warpsph
-
-from .building import all_cores
+from warpsph.simulation.device import all_cores
 
 COPY_BYTES = 2**28  # an array's; beyond every cache
 REPEATS = 5

@@ -1,5 +1,7 @@
 """Times steps as a user makes them, and, apart from that, each phase of the step."""
 
+import contextlib
+import math
 import time
 from collections import defaultdict
 
@@ -16,18 +18,29 @@ PHASES = {
     "motion": ("_motion", "move"),
     "lists": (None, "_build_lists"),
 }
-REST = "rest"  # all else: reading flags, evaluating functions of time, Python
+REST = "rest"  # all else: the clock, reading flags, evaluating functions of time, Python
 LONGEST_INTERVAL = 400  # steps; the scenes rebuild their lists every 40 or so
 
 
+class _Builds:
+    """An observer that ends a run when the pair lists have just been rebuilt."""
+
+    next_time = math.inf
+
+    def __init__(self, simulation: Simulation):
+        self._builds = simulation.list_builds
+
+    def observe(self, simulation: Simulation) -> None:
+        if simulation.list_builds > self._builds:
+            raise StopIteration
+
+
 def advance_to_list_build(simulation: Simulation) -> int:
-    """Step until the pair lists have just been rebuilt; the number of steps."""
-    builds = simulation.list_builds
-    for k in range(1, LONGEST_INTERVAL + 1):
-        simulation.step()
-        if simulation.list_builds > builds:
-            return k
-    return LONGEST_INTERVAL
+    """Run as a user does until the pair lists have just been rebuilt; the number of steps."""
+    steps, limit = simulation.steps, simulation.time_step_limit
+    with contextlib.suppress(StopIteration):
+        simulation.run(until=simulation.time + LONGEST_INTERVAL * limit, observers=[_Builds(simulation)])
+    return simulation.steps - steps
 
 
 def time_steps(simulation: Simulation, seconds: float) -> dict:
@@ -63,7 +76,8 @@ def time_steps(simulation: Simulation, seconds: float) -> dict:
 def time_phases(simulation: Simulation) -> dict[str, float]:
     """Share of each phase in the time of the steps from one list build to the next [-].
 
-    The device is waited for after every phase, so the sum is more than the same steps take otherwise.
+    The step is not recorded here, and the device is waited for after every phase, so the sum is more than the same
+    steps take otherwise.
     """
     stepper, spent = simulation._stepper, defaultdict(float)
     wrapped = []
@@ -73,6 +87,8 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
             continue  # an object that does nothing
         object.__setattr__(owner, method, _timed(getattr(owner, method), phase, spent, simulation.device))
         wrapped.append((owner, method))
+    stepper._record = lambda dt: _Plain(stepper, dt)
+    wrapped.append((stepper, "_record"))
     begin = time.perf_counter()
     advance_to_list_build(simulation)
     wp.synchronize_device(simulation.device)
@@ -81,6 +97,17 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
         object.__delattr__(owner, method)
     spent[REST] = total - sum(spent.values())
     return {phase: seconds / total for phase, seconds in spent.items()}
+
+
+class _Plain:
+    """Steps made launch by launch."""
+
+    def __init__(self, stepper, dt: float):
+        self._stepper, self._dt = stepper, dt
+
+    def run(self) -> None:
+        while self._stepper.clock.going.numpy()[0]:
+            self._stepper.step(self._dt)
 
 
 def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):

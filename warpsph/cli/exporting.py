@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -41,6 +42,8 @@ def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Si
 class _NoFrames:
     """Keeps no frames; a new run removes those of a former one, which would be taken for its own."""
 
+    next_time = math.inf
+
     def __init__(self, simulation: Simulation, folder: Path):
         if not simulation.steps:
             clear(folder)
@@ -63,6 +66,11 @@ class Lenient:
     def __init__(self, make: Callable[[], FrameWriter | Follower], lost: str):
         self._lost, self._works = lost, True
         self._inner = self._attempt(make)
+
+    @property
+    def next_time(self) -> float:
+        """When the inner observer has to look [s]; never when it has failed."""
+        return self._inner.next_time if self._works else math.inf
 
     def observe(self, simulation: Simulation) -> None:
         """Pass on."""

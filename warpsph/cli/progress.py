@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from tqdm import tqdm
 
 from ..simulation.simulation import Simulation
@@ -26,6 +28,7 @@ class Progress:
             bar_format="{percentage:3.0f}%|{bar}| t = {n:.4g}/{total:.4g} s, {elapsed}<{remaining}{postfix}",
         )
         self._first_step = simulation.steps
+        self.next_time = math.inf  # any time will do
 
     def observe(self, simulation: Simulation) -> None:
         """Move the bar."""

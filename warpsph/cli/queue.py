@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import sys
 import time as clock
@@ -12,18 +13,17 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from ..simulation.device import THREADS, all_cores
 from .scene_run import SceneRun
 
 POLL = 1.0  # [s]
 
 
 def processes(jobs: int) -> Executor:
-    """Makes each run in a process of this machine.
-
-    A CPU kernel runs on one thread, so that separate processes are what uses several cores.
-    """
+    """Makes each run in a process of this machine, which share the cores."""
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
-    return ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_leave_interrupts_to_parent)
+    threads = max(1, all_cores() // jobs)
+    return ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_begin, initargs=(threads,))
 
 
 def make_missing(
@@ -82,5 +82,6 @@ def make_missing(
     return failed
 
 
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _begin(threads: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's business
+    os.environ.setdefault(THREADS, str(threads))

@@ -53,9 +53,9 @@ class Restart:
     def watching(
         self, simulation: Simulation, history: History, folder: Path, settings: Settings
     ) -> Iterator[Observer]:
-        """An observer that writes the checkpoints; while it is in use, signals stop the run after a step.
+        """An observer that writes the checkpoints; while it is in use, signals stop the run between steps.
 
-        A second signal does not wait for the step to end. The settings are kept in the checkpoints.
+        A second signal does not wait for them to end. The settings are kept in the checkpoints.
         """
         if self.interval is None:
             yield _Nothing()
@@ -75,6 +75,8 @@ class Restart:
 
 
 class _Nothing:
+    next_time = math.inf
+
     def observe(self, simulation: Simulation) -> None:
         """Nothing."""
 
@@ -82,6 +84,10 @@ class _Nothing:
 class _Stopper:
     def __init__(self, checkpoints: Checkpoints, folder: Path):
         self._checkpoints, self._folder, self._asked = checkpoints, folder, None
+
+    @property
+    def next_time(self) -> float:
+        return self._checkpoints.next_time
 
     def ask(self, number: int, frame: object) -> None:
         if self._asked is not None:

@@ -58,7 +58,7 @@ def run(
     """
     say = (lambda text: None) if quiet else print
     start = clock.perf_counter()
-    simulation = Simulation(scene, device=settings.device, precision=settings.precision)
+    simulation = Simulation(scene, device=settings.device, precision=settings.precision, threads=settings.threads)
     settings = replace(settings, device=simulation.device.alias)
     component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
     folder = writable(folder)

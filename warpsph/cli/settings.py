@@ -19,6 +19,7 @@ class Settings:
     Args:
         device: Warp device; the first GPU, or else the CPU, when None.
         precision: float64 or float32.
+        threads: number of CPU threads; as many as pay off when None.
         until: simulated time at which it ends [s]; the scene's duration when None.
         frames: how many to keep for pictures and exports, besides the one at the start; none at all when 0.
         usd: path of the USD stage it writes; none when None.
@@ -27,6 +28,7 @@ class Settings:
 
     device: str | None = None
     precision: str = "float64"
+    threads: int | None = None
     until: float | None = None
     frames: int = 50
     usd: str | None = None
@@ -49,6 +51,8 @@ class Settings:
             number("run.until", table["until"], above=0.0)
         if "frames" in table:
             index("run.frames", table["frames"])
+        if "threads" in table:
+            index("run.threads", table["threads"], at_least=1)
         return cls(**table)
 
     def table(self) -> dict[str, object]:
@@ -63,6 +67,9 @@ def add_settings(running: argparse.ArgumentParser) -> None:
     default = Settings()
     running.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
     running.add_argument("--precision", help=f"{' or '.join(PRECISIONS)} (default: {default.precision})")
+    running.add_argument(
+        "--threads", metavar="N", help="CPU threads; results do not depend on it (default: as many as pay off)"
+    )
     running.add_argument("--until", metavar="T", help="end at this simulated time [s]; checks need the whole run")
     running.add_argument(
         "--frames", metavar="N", help=f"frames to keep for plot and export (default: {default.frames})"
@@ -85,8 +92,9 @@ def chosen(options: argparse.Namespace, before: Settings) -> Settings:
     given = {
         "device": options.device,
         "precision": options.precision,
+        "threads": None if options.threads is None else count("--threads", options.threads, at_least=1),
         "until": None if options.until is None else _until(options.until),
-        "frames": None if options.frames is None else count(options.frames),
+        "frames": None if options.frames is None else count("--frames", options.frames),
         "usd": options.usd,
         "checkpoint_every": options.checkpoint_every,
     }
@@ -103,9 +111,9 @@ def _until(text: str) -> float:
         raise SceneError("--until", text, "it must be a number above 0 [s]") from None
 
 
-def count(text: str) -> int:
-    """A number of frames."""
+def count(option: str, text: str, at_least: int = 0) -> int:
+    """A whole number."""
     try:
-        return index("--frames", int(text))
+        return index(option, int(text), at_least=at_least)
     except ValueError:
-        raise SceneError("--frames", text, "it must be a whole number, at least 0") from None
+        raise SceneError(option, text, f"it must be a whole number, at least {at_least}") from None

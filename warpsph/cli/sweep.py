@@ -8,6 +8,7 @@ import hashlib
 import io
 import itertools
 import json
+import os
 import re
 import signal
 import subprocess
@@ -23,7 +24,7 @@ from ..errors import SceneError
 from ..ground.precision import precision as precision_of
 from ..scene.parameter import assign
 from ..simulation.checkpoint import CHECKPOINT
-from ..simulation.device import choose_device, start_warp
+from ..simulation.device import THREADS, all_cores, choose_device, start_warp
 from ..simulation.files import write_whole
 from .catalogue import load, shipped
 from .queue import make_missing
@@ -97,7 +98,9 @@ def _call(command: Sequence[str], folder: Path) -> int:
     if _stopping.is_set():
         return INTERRUPTED
     with (folder / "log.txt").open("w", encoding="utf-8") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+        # Runs stand side by side: each on one core, unless told otherwise.
+        environment = {THREADS: "1"} | os.environ
+        process = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True, env=environment)
     _processes.add(process)
     if _stopping.is_set():  # the signal came just before
         process.terminate()
@@ -234,7 +237,7 @@ def _sweep(options: argparse.Namespace) -> int:
     start_warp()
     if options.device and not options.dask:
         choose_device(options.device)
-    chosen = members(options.scene, options.set, options.precision, count(options.frames))
+    chosen = members(options.scene, options.set, options.precision, count("--frames", options.frames))
     folder = writable(Path(options.out or Path("runs") / f"{load(options.scene).name}-sweep")).absolute()
     try:
         with _workers(options) as workers:
@@ -253,6 +256,7 @@ def _sweep(options: argparse.Namespace) -> int:
 @contextmanager
 def _workers(options: argparse.Namespace):
     if options.dask is None:
+        os.environ.setdefault(THREADS, str(max(1, all_cores() // options.jobs)))
         yield ThreadPoolExecutor(options.jobs)  # a thread waits for each process
         return
     try:

@@ -105,7 +105,7 @@ class FrameWriter:
         self._fields = {name: own[name].unit for name in names}
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(simulation, rate)
-        self._due, self._followers = -1.0, ()
+        self.next_time, self._followers = -1.0, ()
         self.observe(simulation)
         self._followers = tuple(follow(Frames(run)) for follow in followers)
 
@@ -128,10 +128,10 @@ class FrameWriter:
 
     def observe(self, simulation: Simulation) -> None:
         """Write a frame when its time has come."""
-        if simulation.time < self._due:
+        if simulation.time < self.next_time:
             return
         passed = int(np.searchsorted(self._times, simulation.time * (1.0 + ROUNDING), side="right"))
-        self._due = self._times[passed] * (1.0 - ROUNDING) if passed < len(self._times) else float("inf")
+        self.next_time = self._times[passed] * (1.0 - ROUNDING) if passed < len(self._times) else float("inf")
         path = self._folder / f"{passed - 1:06d}.npz"
         if passed and not path.exists():
             fields = {name: simulation.field(name).astype(np.float32) for name in self._fields}

@@ -33,6 +33,7 @@ class Neighbours:
 
     Args:
         continuum, precision: what the points are.
+        launcher: launches the kernels that make it.
         targets, sources: node structs (material or auxiliary).
         support: radius of the support in smoothing lengths.
         spacing: lattice spacing [m].
@@ -43,9 +44,9 @@ class Neighbours:
         kernels: the kernels that make it.
     """
 
-    def __init__(self, continuum, precision, targets, sources, support, spacing, skin):
+    def __init__(self, continuum, precision, launcher, targets, sources, support, spacing, skin):
         self.pairs = PairList()
-        self._targets, self._sources = targets, sources
+        self._launcher, self._targets, self._sources = launcher, targets, sources
         self._support, self._skin, self._spacing = support, skin, spacing
         self._kernels = _list_kernels(continuum, precision)
         self.kernels = (self._kernels.copy_points, self._kernels.count, self._kernels.fill)
@@ -61,13 +62,8 @@ class Neighbours:
         kernels, device = self._kernels, self._grid_points.device
         n = self._targets.point.shape[0]
         origin = kernels.vector(*self._origin.tolist())
-        wp.launch(
-            kernels.copy_points,
-            self._sources.point.shape[0],
-            inputs=[self._sources.point, origin],
-            outputs=[self._grid_points],
-            device=device,
-        )
+        copied = [self._sources.point, origin, self._grid_points]
+        self._launcher.launch(kernels.copy_points, self._grid_points, copied)
         # The grid works in float32: widen its queries by what rounding can do, the sweep tests exactly.
         extent = float(np.abs(self._grid_points.numpy()).max())
         margin = self._skin + 1e-4 * self._spacing + 1e-6 * extent
@@ -75,12 +71,12 @@ class Neighbours:
         self._grid.build(self._grid_points, radius)
         query = [self._grid.id, self._grid_points, self._targets.point, self._targets.smoothing_length]
         query += [origin, self._support, margin]
-        wp.launch(kernels.count, n, inputs=query, outputs=[self._counts], device=device)
+        self._launcher.launch(kernels.count, self._targets.point, [*query, self._counts])
         wp.utils.array_scan(self._counts, self.pairs.start, inclusive=False)
         total = int(self.pairs.start[n : n + 1].numpy()[0])
         if self.pairs.index is None or self.pairs.index.shape[0] < total:
             self.pairs.index = wp.empty(int(1.1 * total) + 1, dtype=wp.int32, device=device)
-        wp.launch(kernels.fill, n, inputs=[*query, self.pairs], device=device)
+        self._launcher.launch(kernels.fill, self._targets.point, [*query, self.pairs])
 
 
 def _grid_size(sources, spacing: float, dim: int) -> tuple[int, int, int]:
@@ -110,12 +106,13 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
         return p
 
     @wp.kernel(module="unique", enable_backward=False)
-    def copy_points(points: wp.array(dtype=Point), origin: vector, out: wp.array(dtype=wp.vec3)):
-        i = wp.tid()
+    def copy_points(first: int, points: wp.array(dtype=Point), origin: vector, out: wp.array(dtype=wp.vec3)):
+        i = first + wp.tid()
         out[i] = grid_point(points[i].x, origin)
 
     @wp.kernel(module="unique", enable_backward=False)
     def count(
+        first: int,
         grid: wp.uint64,
         grid_points: wp.array(dtype=wp.vec3),
         targets: wp.array(dtype=Point),
@@ -125,7 +122,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
         margin: float,
         counts: wp.array(dtype=wp.int32),
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         p = grid_point(targets[i].x, origin)
         radius = support * wp.float32(smoothing_length[i]) + margin
         found = wp.int32(0)
@@ -136,6 +133,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
 
     @wp.kernel(module="unique", enable_backward=False)
     def fill(
+        first: int,
         grid: wp.uint64,
         grid_points: wp.array(dtype=wp.vec3),
         targets: wp.array(dtype=Point),
@@ -145,7 +143,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
         margin: float,
         pairs: PairList,
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         p = grid_point(targets[i].x, origin)
         radius = support * wp.float32(smoothing_length[i]) + margin
         k = pairs.start[i]

@@ -9,6 +9,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
@@ -25,18 +26,18 @@ class CellMotion(Motion):
     """Moves the nodes with v^{n+1/2}; volumes, densities and smoothing lengths follow from the cells.
 
     Args:
-        scene, skin, precision, device: as for `Motion`.
+        scene, skin, precision, launcher, outdated: as for `Motion`.
     """
 
-    def __init__(self, scene: Scene, skin: float, precision: Precision, device: wp.Device):
-        super().__init__(scene, skin, precision, device)
-        lattice, continuum = scene.lattice, scene.lattice.continuum
+    def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
+        super().__init__(scene, skin, precision, launcher, outdated)
+        device, lattice, continuum = launcher.device, scene.lattice, scene.lattice.continuum
         self._of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
         self._initial_volume = wp.array(lattice.cell_volumes(), dtype=precision.real, device=device)
         self._ratio = scene.numerics.smoothing_ratio
         self._cell_h = wp.zeros(len(lattice.cells), dtype=precision.real, device=device)
         self._shift, self._measure, self._share = _kernels(continuum, precision)
-        self._spacing = Spacing(len(lattice.cells), continuum, precision, device)
+        self._spacing = Spacing(len(lattice.cells), continuum, precision, launcher)
         self.kernels = (self._shift, self._measure, self._share, *self._spacing.kernels)
 
     def mark(self, nodes, auxiliary) -> None:
@@ -50,14 +51,13 @@ class CellMotion(Motion):
 
     def move(self, nodes, auxiliary, dt: float) -> None:
         """x ← x + Δt v^{n+1/2}; then x, V, ρ and h of the cells, then V, ρ and h of the nodes."""
-        device, n, m = nodes.point.device, nodes.point.shape[0], auxiliary.point.shape[0]
-        wp.launch(self._shift, n, inputs=[dt, nodes], device=device)
+        self._launcher.launch(self._shift, nodes.point, [dt, nodes], gathers=False)
         inputs = [self._reference_density, self._initial_volume, self._ratio, self._support, 0.5 * self._skin]
         inputs += [self._cell_h, nodes, auxiliary, self._outdated]
-        wp.launch(self._measure, m, inputs=inputs, device=device)
+        self._launcher.launch(self._measure, auxiliary.point, inputs)
         inputs = [self._support, 0.5 * self._skin, self._listed, self._listed_h, self._of_node]
         inputs += [auxiliary, nodes, self._outdated]
-        wp.launch(self._share, n, inputs=inputs, device=device)
+        self._launcher.launch(self._share, nodes.point, inputs)
 
 
 @cache
@@ -69,8 +69,8 @@ def _kernels(continuum, precision):
     edges_of = edges_function(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def shift(dt: real, nodes: MaterialNodes):
-        i = wp.tid()
+    def shift(first: int, dt: real, nodes: MaterialNodes):
+        i = first + wp.tid()
         u = nodes.displacement[i] + dt * nodes.half_velocity[i]
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
@@ -89,6 +89,7 @@ def _kernels(continuum, precision):
 
     @wp.kernel(module="unique", enable_backward=False)
     def measure(
+        first: int,
         reference_density: real,
         initial_volume: wp.array(dtype=real),
         ratio: real,
@@ -99,7 +100,7 @@ def _kernels(continuum, precision):
         auxiliary: AuxiliaryNodes,
         outdated: wp.array(dtype=wp.int32),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x = vector()
         for k in range(wp.static(corners)):
             x += nodes.point[auxiliary.cell[a, k]].x
@@ -115,6 +116,7 @@ def _kernels(continuum, precision):
 
     @wp.kernel(module="unique", enable_backward=False)
     def share(
+        first: int,
         support: real,
         half_skin: real,
         listed: wp.array(dtype=vector),
@@ -124,7 +126,7 @@ def _kernels(continuum, precision):
         nodes: MaterialNodes,
         outdated: wp.array(dtype=wp.int32),
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         total, found, h = real(0.0), real(0.0), real(0.0)
         for k in range(wp.static(corners)):
             a = of_node[i, k]

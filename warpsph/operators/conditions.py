@@ -10,12 +10,14 @@ import numpy as np
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.node_sets import NodeTypes, node_types
 from ..scene.boundary import BoundaryTable
 from ..scene.dimension import Continuum
+from .clock import END, Clock
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,8 @@ class ConditionTypes:
 
     Attributes:
         Table: struct of arrays: `row` (n,), the row of each node or −1; P, Π, amplitudes and functions a row,
-            `drive`, the present value of each function of time, and `turned`, the rotation R of Π's directions.
-        apply: (node, φ, Table) → φ after v ← P v + Σ a_k f_k, σ ← R Π(Rᵀ σ R) Rᵀ.
+            `drive`, the values of the functions of time (see `Clock`); `turned`, the rotation R of Π's directions.
+        apply: (node, φ, HALF or END, Table) → φ after v ← P v + Σ a_k f_k, σ ← R Π(Rᵀ σ R) Rᵀ.
     """
 
     Table: type
@@ -47,17 +49,17 @@ def condition_types(continuum: Continuum, precision: Precision) -> ConditionType
         stress_projector: wp.array(dtype=stress_matrix)
         amplitude: wp.array2d(dtype=vector)
         function: wp.array2d(dtype=wp.int32)
-        drive: wp.array(dtype=real)
+        drive: wp.array2d(dtype=real)
         turned: wp.array(dtype=types.tensor)
 
     @wp.func
-    def apply(i: int, values: phi.phi, table: Table):
+    def apply(i: int, values: phi.phi, when: int, table: Table):
         row = table.row[i]
         if row < 0:
             return values
         v = table.velocity_projector[row] * velocity_of(values)
         for k in range(table.amplitude.shape[1]):
-            v += table.drive[table.function[row, k]] * table.amplitude[row, k]
+            v += table.drive[when, table.function[row, k]] * table.amplitude[row, k]
         R = table.turned[row]
         left = table.stress_projector[row] * transform(stress_of(values), wp.transpose(R))
         return join(v, transform(left, R))
@@ -71,6 +73,7 @@ class Conditions:
     Args:
         boundary: the resolved conditions.
         n: number of material nodes.
+        clock: drives the conditions.
         turns: whether the directions of edges that nobody moves turn with their nodes.
 
     Attributes:
@@ -85,13 +88,14 @@ class Conditions:
         n: int,
         continuum: Continuum,
         precision: Precision,
-        device: wp.Device,
+        launcher: Launcher,
+        clock: Clock,
         turns: bool = False,
     ):
-        types = node_types(continuum, precision)
+        types, device = node_types(continuum, precision), launcher.device
+        self._launcher, self._clock = launcher, clock
         self.types = condition_types(continuum, precision)
         self.table = self.types.Table()
-        self._functions = boundary.functions
         self._kernel = apply_kernel(continuum, precision, self.types)
         self._turns = wp.array(np.flatnonzero(~boundary.moved) if turns else [], dtype=wp.int32, device=device)
         self._node = wp.array(boundary.nodes, dtype=wp.int32, device=device)
@@ -116,12 +120,7 @@ class Conditions:
         if terms:
             table.amplitude.assign(boundary.amplitude)
             table.function.assign(boundary.function)
-        table.drive = self._drive = wp.zeros(max(1, len(self._functions)), dtype=precision.real, device=device)
-
-    def set_time(self, t: float) -> None:
-        """Evaluate the prescribed velocities at time t [s]."""
-        if self._functions:
-            self._drive.assign([f(t) if callable(f) else f for f in self._functions])
+        table.drive = self._clock.drive
 
     def locate(self, nodes) -> None:
         """Nothing: all conditions are on nodes chosen once and for all."""
@@ -130,27 +129,12 @@ class Conditions:
         """Turn the directions of edges that nobody moves as the stresses turn in the same time."""
         if self._turns.shape[0]:
             inputs = [nodes, self._turns, self._node, dt, self.table]
-            wp.launch(self._turn, self._turns.shape[0], inputs=inputs, device=self._turns.device)
+            self._launcher.launch(self._turn, self._turns, inputs)
 
-    def follow(self, nodes) -> None:
-        """Nothing."""
-
-    def apply(self, nodes, t: float, step: int, health: wp.array) -> None:
-        """Step 13: impose the conditions at time t on the nodes, in place, and note the first non-finite node.
-
-        Args:
-            nodes: material nodes.
-            t: time [s].
-            step: number of the step, for the report.
-            health: (node, step) of the first non-finite value, −1 while there is none.
-        """
-        self.set_time(t)
-        wp.launch(
-            self._kernel,
-            nodes.point.shape[0],
-            inputs=[self.table, step, nodes, health],
-            device=nodes.point.device,
-        )
+    def apply(self, nodes) -> None:
+        """Step 13: impose the conditions at the end of the step on the nodes, in place; note values not finite."""
+        inputs = [self.table, nodes, self._clock.non_finite]
+        self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
 @cache
@@ -160,15 +144,14 @@ def apply_kernel(continuum: Continuum, precision: Precision, conditions: Conditi
     Table, apply = conditions.Table, conditions.apply
 
     @wp.kernel(module="unique", enable_backward=False)
-    def apply_conditions(table: Table, step: int, nodes: MaterialNodes, health: wp.array(dtype=wp.int32)):
-        i = wp.tid()
-        phi = apply(i, nodes.point[i].phi, table)
+    def apply_conditions(first: int, table: Table, nodes: MaterialNodes, non_finite: wp.array(dtype=wp.int32)):
+        i = first + wp.tid()
+        phi = apply(i, nodes.point[i].phi, END, table)
         nodes.point[i].phi = phi
         u = nodes.displacement[i]
         # A NaN position is nobody's neighbour, so that it would never show in φ.
-        if not wp.isfinite(wp.dot(phi, phi) + wp.dot(u, u)) and health[0] < 0:
-            health[0] = i
-            health[1] = step
+        if not wp.isfinite(wp.dot(phi, phi) + wp.dot(u, u)):
+            non_finite[0] = 1
 
     return apply_conditions
 
@@ -181,13 +164,14 @@ def turn_kernel(continuum: Continuum, precision: Precision, conditions: Conditio
 
     @wp.kernel(module="unique", enable_backward=False)
     def turn(
+        first: int,
         nodes: MaterialNodes,
         turns: wp.array(dtype=wp.int32),
         node: wp.array(dtype=wp.int32),
         dt: real,
         table: Table,
     ):
-        row = turns[wp.tid()]
+        row = turns[first + wp.tid()]
         table.turned[row] = rotation(nodes.velocity_gradient[node[row]], dt) * table.turned[row]
 
     return turn

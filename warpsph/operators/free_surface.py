@@ -19,6 +19,7 @@ import numpy as np
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
 from ..ground.precision import Precision
 from ..ground.smoothing import wendland_c2
@@ -28,6 +29,7 @@ from ..nodes.node_sets import node_types
 from ..scene.boundary import SMOOTH_EDGE_ANGLE
 from ..scene.dimension import Continuum
 from ..scene.scene import Scene
+from .clock import Clock
 from .conditions import Conditions, ConditionTypes, apply_kernel, condition_types
 from .surface_scan import SurfaceScan, surface_types
 
@@ -48,13 +50,13 @@ class FreeSurfaceConditions(Conditions):
         nodes: material nodes.
     """
 
-    def __init__(self, scene: Scene, nodes, precision: Precision, device: wp.Device):
-        lattice, surface = scene.lattice, scene.free_surface
+    def __init__(self, scene: Scene, nodes, precision: Precision, launcher: Launcher, clock: Clock):
+        device, lattice, surface = launcher.device, scene.lattice, scene.free_surface
         continuum, types = lattice.continuum, node_types(lattice.continuum, precision)
-        super().__init__(scene.boundary, len(lattice.nodes), continuum, precision, device)
+        super().__init__(scene.boundary, len(lattice.nodes), continuum, precision, launcher, clock)
         self._unmoved = ~surface.moved(lattice, scene.boundary)
         self._moves = scene.large_displacements
-        self._scan = SurfaceScan(scene, surface.candidates(lattice, scene.boundary), nodes, precision, device)
+        self._scan = SurfaceScan(scene, surface.candidates(lattice, scene.boundary), nodes, precision, launcher)
         self.types = free_surface_types(continuum, precision)
         self._b = self._scan.candidates.node.shape[0]
         walls, self.table = self.table, self.types.Table()
@@ -63,7 +65,7 @@ class FreeSurfaceConditions(Conditions):
         self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
         self.table.unloading = wp.array(_unloading(scene), dtype=precision.real, device=device)
         self._turned = wp.zeros(self._b, dtype=precision.real, device=device)
-        self._outdated = wp.zeros(1, dtype=wp.int32, device=device)
+        self._outdated = clock.surface_outdated
         self._kernel = apply_kernel(continuum, precision, self.types)
         self._project = _project_kernel(continuum, precision)
         self._turn = _turn_kernel(continuum, precision)
@@ -88,12 +90,7 @@ class FreeSurfaceConditions(Conditions):
         """
         if self._moves:
             inputs = [nodes, self._scan.candidates, dt, self.table, self._turned, self._outdated]
-            wp.launch(self._turn, self._b, inputs=inputs, device=self._turned.device)
-
-    def follow(self, nodes) -> None:
-        """Find the free surface anew once it may have turned noticeably."""
-        if self._moves and self._outdated.numpy()[0]:
-            self.locate(nodes)
+            self._launcher.launch(self._turn, self._turned, inputs)
 
     def on_surface(self) -> np.ndarray:
         """Which nodes are on the free surface and not under a velocity condition, boolean, shape (n,)."""
@@ -148,8 +145,8 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
         return left - unloading[taken] * lost * transform(spherical(real(1.0)), P)
 
     @wp.func
-    def apply(i: int, values: phi.phi, table: Table):
-        result = apply_walls(i, values, table.conditions)
+    def apply(i: int, values: phi.phi, when: int, table: Table):
+        result = apply_walls(i, values, when, table.conditions)
         c = table.row[i]
         if c >= 0:
             result = join(velocity_of(result), released(stress_of(result), table.projector[c], table.unloading))
@@ -247,6 +244,7 @@ def _turn_kernel(continuum: Continuum, precision: Precision):
 
     @wp.kernel(module="unique", enable_backward=False)
     def turn(
+        first: int,
         nodes: MaterialNodes,
         candidates: Candidates,
         dt: real,
@@ -254,7 +252,7 @@ def _turn_kernel(continuum: Continuum, precision: Precision):
         turned: wp.array(dtype=real),
         outdated: wp.array(dtype=wp.int32),
     ):
-        c = wp.tid()
+        c = first + wp.tid()
         L = nodes.velocity_gradient[candidates.node[c]]
         R = rotation(L, dt)
         table.projector[c] = R * table.projector[c] * wp.transpose(R)

@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
@@ -30,10 +31,6 @@ class NoMotion:
     def move(self, nodes, auxiliary, dt: float) -> None:
         """Nothing."""
 
-    def lists_outdated(self) -> bool:
-        """Never."""
-        return False
-
     def mark(self, nodes, auxiliary) -> None:
         """Nothing."""
 
@@ -48,17 +45,18 @@ class Motion:
     Args:
         scene: the scene.
         skin: skin of the pair lists [m].
+        outdated: one integer, set once some node has used up its half of the skin since `mark`.
     """
 
-    def __init__(self, scene: Scene, skin: float, precision: Precision, device: wp.Device):
-        continuum, n = scene.lattice.continuum, len(scene.lattice.nodes)
+    def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
+        device, continuum, n = launcher.device, scene.lattice.continuum, len(scene.lattice.nodes)
         types = node_types(continuum, precision)
         self._support, self._skin = KERNELS[scene.numerics.kernel].support, skin
         self._reference_density = scene.material.density
         self._initial_smoothing_length: wp.array | None = None
         self._listed = wp.zeros(n, dtype=types.vector, device=device)
         self._listed_h = wp.zeros(n, dtype=precision.real, device=device)
-        self._outdated = wp.zeros(1, dtype=wp.int32, device=device)
+        self._launcher, self._outdated = launcher, outdated
         self._kernel = _move_kernel(continuum, precision)
         self._centre = centre_kernel(continuum, precision)
         self.kernels = (self._kernel, self._centre)
@@ -71,34 +69,16 @@ class Motion:
         wp.copy(self._listed_h, nodes.smoothing_length)
         self._outdated.zero_()
 
-    def lists_outdated(self) -> bool:
-        """Whether some node has used up its half of the skin since `mark`."""
-        return bool(self._outdated.numpy()[0])
-
     def shrinkage(self, nodes, auxiliary) -> float:
         """1: the published schemes keep their step, since their viscosity depends on it."""
         return 1.0
 
     def move(self, nodes, auxiliary, dt: float) -> None:
         """x ← x + Δt v^{n+1/2}, ρ ← ρ/(change of volume), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""
-        device = nodes.point.device
-        wp.launch(
-            self._kernel,
-            nodes.point.shape[0],
-            inputs=[
-                self._reference_density,
-                self._initial_smoothing_length,
-                self._support,
-                0.5 * self._skin,
-                dt,
-                self._listed,
-                self._listed_h,
-                nodes,
-                self._outdated,
-            ],
-            device=device,
-        )
-        wp.launch(self._centre, auxiliary.point.shape[0], inputs=[nodes, auxiliary], device=device)
+        inputs = [self._reference_density, self._initial_smoothing_length, self._support, 0.5 * self._skin, dt]
+        inputs += [self._listed, self._listed_h, nodes, self._outdated]
+        self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
+        self._launcher.launch(self._centre, auxiliary.point, [nodes, auxiliary])
 
 
 @cache
@@ -141,6 +121,7 @@ def _move_kernel(continuum: Continuum, precision: Precision):
 
     @wp.kernel(module="unique", enable_backward=False)
     def move(
+        first: int,
         reference_density: real,
         initial_smoothing_length: wp.array(dtype=real),
         support: real,
@@ -151,7 +132,7 @@ def _move_kernel(continuum: Continuum, precision: Precision):
         nodes: MaterialNodes,
         outdated: wp.array(dtype=wp.int32),
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         u = nodes.displacement[i] + dt * nodes.half_velocity[i]
         # The exact change of volume of the map xⁿ → xⁿ + Δt v, whose gradient is (1 + ½ΔtL)(1 − ½ΔtL)⁻¹ when L
         # refers to the half step; to first order 1 + Δt tr(d).
@@ -180,8 +161,8 @@ def centre_kernel(continuum: Continuum, precision: Precision):
     corners = 2**continuum.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def centre(nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
-        a = wp.tid()
+    def centre(first: int, nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
+        a = first + wp.tid()
         x = vector()
         volume, density, h = real(0.0), real(0.0), real(0.0)
         for k in range(wp.static(corners)):

@@ -12,10 +12,10 @@ its own: the velocity's by the classical fourth-order Runge-Kutta scheme, the st
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
@@ -36,7 +36,7 @@ class NoSources:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def half_step(self, nodes, history, t: float, dt: float) -> None:
+    def half_step(self, nodes, history, body_force: wp.array, dt: float) -> None:
         """Nothing."""
 
 
@@ -49,12 +49,10 @@ class Sources:
         integrator: one of `STRESS_INTEGRATORS`.
     """
 
-    def __init__(self, scene: Scene, law: Law, parameters, precision: Precision, integrator):
+    def __init__(self, scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher, integrator):
         continuum = scene.lattice.continuum
-        self._parameters = parameters
-        self._body_force = scene.body_force or (lambda t: np.zeros(continuum.dim))
+        self._parameters, self._launcher = parameters, launcher
         self._damping = scene.damping
-        self._vector = precision.vec(continuum.dim)
         flows, turns = law.flow is not None, spins(scene)
         self._kernel = source_kernel(
             continuum,
@@ -65,21 +63,16 @@ class Sources:
         )
         self.kernels = (self._kernel,)
 
-    def half_step(self, nodes, history, t: float, dt: float) -> None:
-        """Advance the nodes by their sources alone from t to t + dt.
+    def half_step(self, nodes, history, body_force: wp.array, dt: float) -> None:
+        """Advance the nodes by their sources alone.
 
         Args:
             nodes: material nodes; φ and the history are updated in place.
-            t: start [s].
+            body_force: b [m/s²] at the start, in the middle and at the end, on the device.
             dt: length, half a time step [s].
         """
-        force = [self._vector(*self._body_force(t + part * dt).tolist()) for part in (0.0, 0.5, 1.0)]
-        wp.launch(
-            self._kernel,
-            nodes.point.shape[0],
-            inputs=[self._parameters, *force, self._damping, dt, nodes, history],
-            device=nodes.point.device,
-        )
+        inputs = [self._parameters, body_force, self._damping, dt, nodes, history]
+        self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
 def spins(scene: Scene) -> bool:
@@ -87,11 +80,11 @@ def spins(scene: Scene) -> bool:
     return scene.large_displacements and scene.lattice.dim > 1
 
 
-def sources(scene: Scene, law: Law, parameters, precision: Precision) -> Sources | NoSources:
+def sources(scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher) -> Sources | NoSources:
     """The sources of a scene by the scheme it names; an object that does nothing when it has none."""
     if law.flow is None and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
         return NoSources()
-    return Sources(scene, law, parameters, precision, STRESS_INTEGRATORS[scene.numerics.source_scheme])
+    return Sources(scene, law, parameters, precision, launcher, STRESS_INTEGRATORS[scene.numerics.source_scheme])
 
 
 def history_type(law: Law, precision: Precision) -> type:
@@ -202,21 +195,20 @@ def source_kernel(
 
     @wp.kernel(module="unique", enable_backward=False)
     def source_half_step(
+        first: int,
         material: Parameters,
-        body_force_start: vector,
-        body_force_middle: vector,
-        body_force_end: vector,
+        body_force: wp.array(dtype=vector),
         damping: real,
         dt: real,
         nodes: MaterialNodes,
         history: wp.array(dtype=internal),
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         point = nodes.point[i]
         v = velocity_of(point.phi)
         sigma = stress_of(point.phi)
         if wp.static(accelerates):
-            v = rk4_velocity(v, body_force_start, body_force_middle, body_force_end, damping, dt)
+            v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, dt)
         if wp.static(acts_on_stress):
             internals = internal()
             if wp.static(m > 0):

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.launching import Launcher
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
@@ -28,16 +29,15 @@ class Spacing:
         m: number of cells.
     """
 
-    def __init__(self, m: int, continuum: Continuum, precision: Precision, device: wp.Device):
-        self._kernel = _spacing_kernel(continuum, precision)
-        self._spacing = wp.zeros(m, dtype=precision.real, device=device)
+    def __init__(self, m: int, continuum: Continuum, precision: Precision, launcher: Launcher):
+        self._launcher, self._kernel = launcher, _spacing_kernel(continuum, precision)
+        self._spacing = wp.zeros(m, dtype=precision.real, device=launcher.device)
         self._initial: float | None = None
         self.kernels = (self._kernel,)
 
     def shrinkage(self, nodes, auxiliary) -> float:
         """The least time of a wave from node to node over the one at the first call, between `SMALLEST` and 1."""
-        device = self._spacing.device
-        wp.launch(self._kernel, self._spacing.shape[0], [nodes, auxiliary], [self._spacing], device=device)
+        self._launcher.launch(self._kernel, self._spacing, [nodes, auxiliary, self._spacing])
         smallest = float(np.min(self._spacing.numpy()))
         if self._initial is None:
             self._initial = smallest
@@ -50,8 +50,10 @@ def _spacing_kernel(continuum: Continuum, precision: Precision):
     edges_of, frame_of = edges_function(continuum, precision), frame_function(continuum, precision)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def spacing(nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)):
-        a = wp.tid()
+    def spacing(
+        first: int, nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)
+    ):
+        a = first + wp.tid()
         frame = frame_of(edges_of(a, auxiliary, nodes.point))
         stiff = frame * wp.transpose(frame)
         if wp.trace(stiff) <= real(0.0):

@@ -24,6 +24,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.launching import Launcher
 from ..ground.linear_algebra import symmetric_inverse
 from ..ground.precision import Precision
 from ..ground.smoothing import wendland_c2
@@ -109,16 +110,17 @@ class SurfaceScan:
         kernels: the kernels that find the surface.
     """
 
-    def __init__(self, scene: Scene, candidates: np.ndarray, nodes, precision: Precision, device: wp.Device):
+    def __init__(self, scene: Scene, candidates: np.ndarray, nodes, precision: Precision, launcher: Launcher):
         continuum, n, b = scene.lattice.continuum, len(scene.lattice.nodes), len(candidates)
-        types = node_types(continuum, precision)
+        types, device = node_types(continuum, precision), launcher.device
         row = np.full(n, -1, dtype=np.int32)
         row[candidates] = np.arange(b, dtype=np.int32)
         self.row = wp.array(row, dtype=wp.int32, device=device)
         self.candidates = _candidates(candidates, continuum, types, precision, device)
         self._ratio = scene.free_surface.scan_ratio
         spacing = scene.lattice.spacing
-        self._around = Neighbours(continuum, precision, self.candidates, nodes, SCAN_SUPPORT, spacing, skin=0.0)
+        search = (SCAN_SUPPORT, spacing, 0.0)
+        self._around = Neighbours(continuum, precision, launcher, self.candidates, nodes, *search)
         self.pairs = self._around.pairs
         self._gather = _gather_kernel(continuum, precision)
         self._scan = _scan_kernel(continuum, precision)

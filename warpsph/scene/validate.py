@@ -55,12 +55,12 @@ def _real(value: object) -> float:
         return math.nan
 
 
-def index(field: str, value: object, below: int | None = None) -> int:
-    """A whole number from 0 on."""
+def index(field: str, value: object, below: int | None = None, at_least: int = 0) -> int:
+    """A whole number, from 0 on unless said."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not whole or value < 0 or (below is not None and value >= below):
+    if not whole or value < at_least or (below is not None and value >= below):
         limit = "" if below is None else f" and below {below}"
-        raise SceneError(field, value, f"it must be a whole number, at least 0{limit}")
+        raise SceneError(field, value, f"it must be a whole number, at least {at_least}{limit}")
     return int(value)
 
 

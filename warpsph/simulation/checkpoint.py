@@ -152,6 +152,11 @@ class Checkpoints:
         self._history, self._path, self._interval, self._run = history, path, interval, run
         self._mark(simulation)
 
+    @property
+    def next_time(self) -> float:
+        """When one may be due [s]: at every step where the interval is one of steps."""
+        return -math.inf if self._interval.steps < math.inf else self._time + self._interval.time * (1.0 - 1e-9)
+
     def observe(self, simulation: Simulation) -> None:
         """Write one when it is due."""
         interval = self._interval

@@ -11,6 +11,10 @@ import warp as wp
 
 from ..errors import SceneError
 from ..ground.compiling import use_temporary_cache
+from ..scene.validate import index
+
+NODES_A_THREAD = 2000  # with fewer, threads wait for each other longer than they work
+THREADS = "WARPSPH_THREADS"  # the environment variable that says how many a process may use
 
 
 def start_warp() -> None:
@@ -63,3 +67,22 @@ def choose_device(name: str | None) -> wp.Device:
         return wp.get_device(name)
     except Exception:  # Warp raises ValueError, RuntimeError or TypeError, by version
         raise SceneError("device", name, f"it must be one of {', '.join(available)}") from None
+
+
+def all_cores() -> int:
+    """Number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def choose_threads(threads: int | None, n: int) -> int:
+    """Number of CPU threads for n nodes: as many as are given, or else as pay off, at most `WARPSPH_THREADS`.
+
+    Raises:
+        SceneError: `threads`, or the environment variable, is not a whole number above 0.
+    """
+    if threads is not None:
+        return index("threads", threads, at_least=1)
+    most = os.environ.get(THREADS, str(all_cores()))
+    if not most.isdecimal() or int(most) < 1:
+        raise SceneError(THREADS, most, "it must be a whole number, at least 1")
+    return max(1, min(int(most), n // NODES_A_THREAD))

@@ -26,6 +26,7 @@ class History:
 
     Attributes:
         names: column names, `step` and `time` first.
+        next_time: when the next sample is due [s].
         units: their units.
 
     >>> from warpsph import Box, Elastic, NodeValue, Output, Probe, Scene, Simulation
@@ -50,7 +51,7 @@ class History:
         self.names = ["step", "time", *(probe.name for probe in self._probes)]
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
         self._rows: list[list[float]] = []
-        self._next = 0.0
+        self.next_time = -math.inf  # of the simulation [s], when to sample next
         self._file = None if path is None else _Rows(path)
         self._write([f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)])
         if state is None:
@@ -60,10 +61,11 @@ class History:
 
     def observe(self, simulation: Simulation) -> None:
         """Sample when the interval has passed."""
-        if simulation.time < self._next * (1.0 - 1e-9):
+        if simulation.time < self.next_time:
             return
         if self._interval > 0.0:
-            self._next = (math.floor(simulation.time / self._interval * (1.0 + 1e-9)) + 1) * self._interval
+            following = (math.floor(simulation.time / self._interval * (1.0 + 1e-9)) + 1) * self._interval
+            self.next_time = following * (1.0 - 1e-9)
         self.sample(simulation)
 
     def sample(self, simulation: Simulation) -> None:
@@ -77,10 +79,10 @@ class History:
     def state(self) -> dict[str, np.ndarray]:
         """All that is needed to go on: the rows, and when to sample next [s]."""
         rows = np.array(self._rows, dtype=float).reshape(-1, len(self.names))
-        return {"rows": rows, "next": np.array(self._next)}
+        return {"rows": rows, "next": np.array(self.next_time)}
 
     def _restore(self, state: Mapping[str, np.ndarray]) -> None:
-        self._next = float(state["next"])
+        self.next_time = float(state["next"])
         self._rows = [[int(row[0]), *row[1:]] for row in state["rows"].tolist()]
         self._write(*map(_texts, self._rows))
 

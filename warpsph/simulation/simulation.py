@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -10,11 +11,13 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import NonFiniteError, SceneError, one_of
+from ..ground.launching import Launcher
 from ..ground.precision import precision as precision_of
+from ..operators.clock import LONGEST_RUN
 from ..scene.scene import Scene
 from ..scene.validate import instance, number, vector
 from ..step.step import Stepper
-from .device import choose_device
+from .device import choose_device, choose_threads
 from .fields import fields_of
 from .state import arrays, numbers, restore
 from .time_step import ROUNDING, Leg, divide, time_step_limit
@@ -22,10 +25,16 @@ from .time_step import ROUNDING, Leg, divide, time_step_limit
 COUNTERS = ("time", "steps", "wall_time", "shortest_step", "longest_step")
 # A step that has become too long is shortened by a little more than it must be, so that it is not done every time.
 HEADROOM = 0.95
+# Node-steps that the device makes on its own: about 0.1 s on a CPU core, 1 s on a GPU. Signals wait as long.
+AHEAD_ON_CPU, AHEAD_ON_GPU = 200_000, 1_000_000_000
 
 
 class Observer(Protocol):
-    """Something told after every step. Observers only read."""
+    """Something told after a step. Observers only read.
+
+    One with an attribute `next_time` [s] is told after the first step that ends then or later at the latest, and
+    may be told before; one without it after every step. Many steps between looks are made without the host.
+    """
 
     def observe(self, simulation: Simulation) -> None:
         """Look at the simulation."""
@@ -38,6 +47,8 @@ class Simulation:
         scene: the scene.
         device: Warp device name, e.g. `cpu` or `cuda:0`; the first GPU, or else the CPU, unless given.
         precision: `float64` or `float32`.
+        threads: number of CPU threads; results do not depend on it. Unless given, one for every 2000 nodes, at
+            most as many as the environment variable WARPSPH_THREADS says or there are cores.
 
     Attributes:
         scene: the scene.
@@ -45,7 +56,8 @@ class Simulation:
         time: simulated time [s].
         steps: number of steps made.
         shortest_step, longest_step: smallest and largest Δt used so far [s].
-        wall_time: seconds spent in `step`, without the start.
+        wall_time: seconds spent in steps, without the start.
+        threads: number of CPU threads.
         nodes, auxiliary, history: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
 
@@ -53,13 +65,21 @@ class Simulation:
         SceneError: the device, the precision or the time step is not allowed.
     """
 
-    def __init__(self, scene: Scene, device: str | None = None, precision: str = "float64"):
+    def __init__(
+        self,
+        scene: Scene,
+        device: str | None = None,
+        precision: str = "float64",
+        threads: int | None = None,
+    ):
         self.scene = instance("scene", scene, Scene, "a Scene")
         self.precision = precision_of(precision)
         self.device = choose_device(device)
         self.lattice = scene.lattice
         self._initial_limit = time_step_limit(scene)
-        self._stepper = Stepper(scene, self.precision, self.device)
+        launcher = Launcher(self.device, choose_threads(threads, len(self.lattice.nodes)))
+        self.threads = launcher.threads
+        self._stepper = Stepper(scene, self.precision, launcher)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
         self.history, self.conditions = self._stepper.history, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
@@ -83,16 +103,16 @@ class Simulation:
         dt = self.time_step_limit
         if time_step is not None:
             dt = number("time_step", time_step, above=0.0, at_most=self.time_step_limit)
-        self._advance(dt)
+        self._advance([self.time], dt)
 
     def run(self, until: float | None = None, observers: Iterable[Observer] = ()) -> None:
-        """Advance in equal steps until a time, telling the observers after every step.
+        """Advance in equal steps until a time, telling the observers on the way.
 
         A run that was stopped on its way, or restored there, goes on in the steps it had.
 
         Args:
             until: simulated time [s]; the scene's duration unless given.
-            observers: told after every step.
+            observers: told after every step, or when their `next_time` has come.
 
         Raises:
             NonFiniteError: velocity, stress or displacement stopped being finite; observers keep what they have.
@@ -105,7 +125,7 @@ class Simulation:
         if leg is None or leg.end != end or leg.time_after(self.steps) != self.time:
             leg = self._leg = self._leg_to(end, self.time_step_limit)
         while self.steps < leg.first + leg.steps:
-            self._advance(leg.time_step)
+            self._advance(self._starts(leg, observers), leg.time_step)
             self.time = leg.time_after(self.steps)
             if leg.time_step > self.time_step_limit * (1.0 + ROUNDING) and self.time < end:
                 leg = self._leg = self._leg_to(end, HEADROOM * self.time_step_limit)
@@ -115,18 +135,29 @@ class Simulation:
     def _leg_to(self, end: float, limit: float) -> Leg:
         return Leg(self.time, end, divide(end - self.time, limit)[0], self.steps)
 
-    def _advance(self, dt: float) -> None:
+    def _starts(self, leg: Leg, observers: tuple[Observer, ...]) -> list[float]:
+        """Where the next steps begin [s], up to the one after which an observer looks."""
+        due = min((getattr(observer, "next_time", -math.inf) for observer in observers), default=math.inf)
+        ahead = AHEAD_ON_CPU if self.device.is_cpu else AHEAD_ON_GPU
+        most = max(1, min(LONGEST_RUN, ahead // len(self.lattice.nodes), leg.first + leg.steps - self.steps))
+        times = [leg.time_after(self.steps + k) for k in range(most + 1)]
+        return times[: next((k for k in range(1, most) if times[k] >= due), most)]
+
+    def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        self._stepper.step(self.steps + 1, self.time, dt)
-        self.steps += 1
-        self.time += dt
+        made = self._stepper.advance(times, dt)
+        self.steps += made
+        self.time = times[made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)
         self.longest_step = max(self.longest_step, dt)
-        bad = self._stepper.first_non_finite()
         self.wall_time += clock.perf_counter() - begin
-        if bad is not None:
-            node, step = bad
-            raise NonFiniteError(step, self.time, node, self.lattice.nodes[node])
+        if self._stepper.clock.flags()[-1]:
+            node = self._first_non_finite()
+            raise NonFiniteError(self.steps, self.time, node, self.lattice.nodes[node])
+
+    def _first_non_finite(self) -> int:
+        values = [self.nodes.point.numpy()["phi"], self.nodes.displacement.numpy()]
+        return int(np.argmin(np.isfinite(np.hstack(values)).all(axis=1)))
 
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:
         """All that the next steps depend on: arrays and numbers by name; see `restore`."""

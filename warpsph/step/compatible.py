@@ -16,12 +16,14 @@ from functools import cache
 import warp as wp
 
 from ..ground.kinematics import kinematics
+from ..ground.launching import Launcher
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
 from ..operators.cells import cell_types, cells_of_nodes
+from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.shock import STRENGTH, front_pressure
@@ -71,13 +73,13 @@ class CompatibleFluxes:
     """
 
     def __init__(
-        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device
+        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
     ):
         lattice, kernel = scene.lattice, scene.numerics.kernel
         continuum, moves = lattice.continuum, scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
-        types = cell_types(continuum, precision)
-        self._dim = lattice.dim
+        types, device = cell_types(continuum, precision), launcher.device
+        self._launcher, self._dim = launcher, lattice.dim
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
@@ -91,13 +93,13 @@ class CompatibleFluxes:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         front = STRENGTH * max(1.0 - courant**2, 0.0)
         inputs = [material, dt, front, pairs, nodes, history, auxiliary, self._cells]
-        wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
+        self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
 
     def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         share = corner_share(courant, self._dim)
         inputs = [material, conditions, dt, share, pairs, auxiliary, self._cells, nodes]
-        wp.launch(self._to_nodes, nodes.point.shape[0], inputs, device=nodes.point.device)
+        self._launcher.launch(self._to_nodes, nodes.point, inputs)
 
 
 @cache
@@ -117,6 +119,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_auxiliary(
+        first: int,
         material: Parameters,
         dt: real,
         front: real,
@@ -126,7 +129,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
         auxiliary: AuxiliaryNodes,
         cells: Cells,
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         point = auxiliary.point[a]
         phi, cell = describe(a, auxiliary, nodes.point)  # 3
         sums = collect(a, point.x, metric_of(cell.frame, auxiliary.smoothing_length[a]), phi, pairs, nodes.point)
@@ -171,6 +174,7 @@ def _to_nodes_kernel(
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_nodes(
+        first: int,
         material: Parameters,
         conditions: Table,
         dt: real,
@@ -180,10 +184,10 @@ def _to_nodes_kernel(
         cells: Cells,
         nodes: MaterialNodes,
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         point = nodes.point[i]
         increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share)
-        phi_half = apply(i, point.phi + increment, conditions)  # 7
+        phi_half = apply(i, point.phi + increment, HALF, conditions)  # 7
         sums = collect(
             i, point.x, metric_of(frame, nodes.smoothing_length[i]), types.phi(), pairs, auxiliary.point
         )

@@ -4,11 +4,13 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.launching import Launcher
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
+from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.sweep import sweep
@@ -31,8 +33,9 @@ class PublishedFluxes:
     """
 
     def __init__(
-        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device
+        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
     ):
+        self._launcher = launcher
         continuum, numerics = scene.lattice.continuum, scene.numerics
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
@@ -51,12 +54,12 @@ class PublishedFluxes:
     ) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
-        wp.launch(self._to_auxiliary, auxiliary.point.shape[0], inputs, device=nodes.point.device)
+        self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
 
     def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         inputs = [material, conditions, dt, pairs, auxiliary, nodes]
-        wp.launch(self._to_nodes, nodes.point.shape[0], inputs, device=nodes.point.device)
+        self._launcher.launch(self._to_nodes, nodes.point, inputs)
 
 
 @cache
@@ -69,9 +72,14 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_auxiliary(
-        material: Parameters, dt: real, pairs: PairList, nodes: MaterialNodes, auxiliary: AuxiliaryNodes
+        first: int,
+        material: Parameters,
+        dt: real,
+        pairs: PairList,
+        nodes: MaterialNodes,
+        auxiliary: AuxiliaryNodes,
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         point = auxiliary.point[a]
         sums = collect(a, point.x, round_metric(auxiliary.smoothing_length[a]), point.phi, pairs, nodes.point)
         phi = value(sums)  # 3
@@ -104,6 +112,7 @@ def _to_nodes_kernel(
 
     @wp.kernel(module="unique", enable_backward=False)
     def to_nodes(
+        first: int,
         material: Parameters,
         conditions: Table,
         dt: real,
@@ -111,10 +120,10 @@ def _to_nodes_kernel(
         auxiliary: AuxiliaryNodes,
         nodes: MaterialNodes,
     ):
-        i = wp.tid()
+        i = first + wp.tid()
         point = nodes.point[i]
         sums = collect(i, point.x, round_metric(nodes.smoothing_length[i]), point.phi, pairs, auxiliary.point)
-        phi_half = apply(i, value(sums), conditions)  # 7
+        phi_half = apply(i, value(sums), HALF, conditions)  # 7
         grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 

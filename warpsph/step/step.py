@@ -1,8 +1,11 @@
-"""One time step of the Runge-Kutta Taylor SPH method (METHOD section 3, Table I of Blanc and Pastor 2012)."""
+"""The time step of the Runge-Kutta Taylor SPH method (METHOD section 3, Table I of Blanc and Pastor 2012)."""
+
+from collections.abc import Sequence
 
 import warp as wp
 
 from ..ground.compiling import load_kernels
+from ..ground.launching import Launcher, Recording
 from ..ground.materials import law as material_law
 from ..ground.precision import Precision
 from ..nodes.neighbours import SKIN, Neighbours
@@ -13,6 +16,7 @@ from ..nodes.node_sets import (
     node_types,
 )
 from ..operators.cell_motion import CellMotion
+from ..operators.clock import Clock
 from ..operators.conditions import Conditions
 from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.motion import Motion, NoMotion, centre_kernel
@@ -23,24 +27,25 @@ from .fluxes import FLUXES
 
 
 class Stepper:
-    """The state of a scene on a device, and the one function that advances it.
+    """The state of a scene on a device, and the functions that advance it.
 
     Args:
         scene: the scene.
         precision: float32 or float64.
-        device: the Warp device.
+        launcher: launches the kernels.
 
     Attributes:
         nodes: material nodes (struct of arrays, see `warpsph.nodes.node_sets`).
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
+        clock: what differs from step to step.
         shrinkage: least time of a wave from node to node over the initial one, at most 1, as of the last list.
         list_builds: how often the pair lists were built.
     """
 
-    def __init__(self, scene: Scene, precision: Precision, device: wp.Device):
-        lattice, numerics = scene.lattice, scene.numerics
+    def __init__(self, scene: Scene, precision: Precision, launcher: Launcher):
+        lattice, numerics, device = scene.lattice, scene.numerics, launcher.device
         continuum, n = lattice.continuum, len(lattice.nodes)
         types = node_types(continuum, precision)
         law = material_law(scene.material, continuum, precision)
@@ -48,57 +53,70 @@ class Stepper:
         self.nodes = material_nodes(scene, types, precision, device)
         self.auxiliary = auxiliary_nodes(scene, types, precision, device)
         self.history = material_history(n, law, precision, device)
-        self._device, self._n, self._m = device, n, len(lattice.cells)
+        functions = scene.boundary.functions
+        self.clock = Clock(scene.body_force, functions, continuum, precision, launcher)
+        self._launcher, self._recording, self._recorded = launcher, None, None
 
         support, skin = KERNELS[numerics.kernel].support, 0.0
         self._motion = NoMotion()
         if scene.large_displacements:
             skin = SKIN * lattice.spacing
             moving = CellMotion if numerics.follows_cells else Motion
-            self._motion = moving(scene, skin, precision, device)
+            self._motion = moving(scene, skin, precision, launcher, self.clock.lists_outdated)
         search = (support, lattice.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
         centre = centre_kernel(continuum, precision)
         load_kernels([centre], device)
-        wp.launch(centre, self._m, [self.nodes, self.auxiliary], device=device)
-        self._around_auxiliary = Neighbours(continuum, precision, self.auxiliary, self.nodes, *search)
-        self._around_nodes = Neighbours(continuum, precision, self.nodes, self.auxiliary, *search)
-        self._sources = sources(scene, law, self._parameters, precision)
+        launcher.launch(centre, self.auxiliary.point, [self.nodes, self.auxiliary])
+        self._around_auxiliary = Neighbours(continuum, precision, launcher, self.auxiliary, self.nodes, *search)
+        self._around_nodes = Neighbours(continuum, precision, launcher, self.nodes, self.auxiliary, *search)
+        self._sources = sources(scene, law, self._parameters, precision, launcher)
         if scene.free_surface is None:
             turns = numerics.unloads and scene.large_displacements and lattice.dim > 1
-            self.conditions = Conditions(scene.boundary, n, continuum, precision, device, turns)
+            self.conditions = Conditions(scene.boundary, n, continuum, precision, launcher, self.clock, turns)
         else:
-            self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, device)
-        self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, device)
-        self._health = wp.full(2, -1, dtype=wp.int32, device=device)
-        parts = (self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion)
+            self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, launcher, self.clock)
+        self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, launcher)
+        parts = (self.clock, self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion)
         load_kernels([kernel for part in parts for kernel in part.kernels], device)
 
         self.list_builds, self.shrinkage = 0, 1.0
         self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
         self._build_lists()
-        self.conditions.apply(self.nodes, 0.0, 0, self._health)
+        self.clock.begin([0.0], 0.0)
+        self.conditions.apply(self.nodes)
         self._initial_spin(scene)
 
-    def step(self, number: int, t: float, dt: float) -> None:
-        """Advance the nodes from t to t + dt; the numbers are those of METHOD section 3.
+    def advance(self, times: Sequence[float], dt: float) -> int:
+        """Make a step from each of the times to Δt later; fewer when the host is needed before.
 
         Args:
-            number: number of this step, for the report of non-finite values.
-            t: time [s].
+            times: where the steps begin [s], at most `LONGEST_RUN` of them.
             dt: time step [s].
+
+        Returns:
+            The number of steps made, at least one. When a value is not finite, the last one is the first with it.
         """
-        self._sources.half_step(self.nodes, self.history, t, 0.5 * dt)  # 1-2
+        self.clock.begin(times, dt)
+        self._record(dt).run()
+        lists_outdated, surface_outdated, non_finite = self.clock.flags()
+        if lists_outdated and not non_finite:
+            self._build_lists()
+        elif surface_outdated:
+            self.conditions.locate(self.nodes)
+        return self.clock.made()
+
+    def step(self, dt: float) -> None:
+        """Advance the nodes by dt [s]; the numbers are those of METHOD section 3."""
+        self._sources.half_step(self.nodes, self.history, self.clock.first_half, 0.5 * dt)  # 1-2
         self.conditions.turn(self.nodes, 0.5 * dt)
         self.to_auxiliary(dt)  # 3-6
-        self.to_nodes(t + 0.5 * dt, dt)  # 7-10
-        self._sources.half_step(self.nodes, self.history, t + 0.5 * dt, 0.5 * dt)  # 11-12
+        self.to_nodes(dt)  # 7-10
+        self._sources.half_step(self.nodes, self.history, self.clock.second_half, 0.5 * dt)  # 11-12
         self.conditions.turn(self.nodes, 0.5 * dt)
-        self.conditions.apply(self.nodes, t + dt, number, self._health)  # 13
+        self.conditions.apply(self.nodes)  # 13
         self._motion.move(self.nodes, self.auxiliary, dt)  # 14
-        if self._motion.lists_outdated():
-            self._build_lists()
-        self.conditions.follow(self.nodes)
+        self.clock.tick()
 
     def to_auxiliary(self, dt: float) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
@@ -107,9 +125,8 @@ class Stepper:
             self._parameters, dt, self._courant(dt), pairs, self.nodes, self.history, self.auxiliary
         )
 
-    def to_nodes(self, t_half: float, dt: float) -> None:
+    def to_nodes(self, dt: float) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        self.conditions.set_time(t_half)
         table, pairs = self.conditions.table, self._around_nodes.pairs
         self._fluxes.to_nodes(self._parameters, table, dt, self._courant(dt), pairs, self.auxiliary, self.nodes)
 
@@ -117,10 +134,14 @@ class Stepper:
         """c_p Δt over the least present spacing."""
         return dt * self._per_spacing / self.shrinkage
 
-    def first_non_finite(self) -> tuple[int, int] | None:
-        """(node, step) where velocity, stress or displacement first stopped being finite, or None."""
-        node, step = self._health.numpy().tolist()
-        return None if node < 0 else (node, step)
+    def _record(self, dt: float) -> Recording:
+        """The step, recorded anew where one of the numbers or arrays in it is another one than last time."""
+        lists = self._around_auxiliary.pairs, self._around_nodes.pairs
+        content = (dt, self.shrinkage, *(pairs.index.ptr for pairs in lists))
+        if self._recorded != content:
+            self._recording = self._launcher.record(lambda: self.step(dt), self.clock.going)
+            self._recorded = content
+        return self._recording
 
     def _build_lists(self) -> None:
         self._around_auxiliary.build()
@@ -136,5 +157,5 @@ class Stepper:
             return
         start = wp.clone(self.nodes.point)
         self.to_auxiliary(0.0)
-        self.to_nodes(0.0, 0.0)
+        self.to_nodes(0.0)
         wp.copy(self.nodes.point, start)
