@@ -80,10 +80,14 @@ class Neighbours:
 
 
 def _grid_size(sources, spacing: float, dim: int) -> tuple[int, int, int]:
-    """Cells of the hash grid along each axis: about one a search radius, flat where there is no axis."""
+    """Cells of the hash grid along each axis: about one a search radius, flat where there is no axis.
+
+    No more of them than points, for bodies that fill little of their box: cells wrap around.
+    """
     x = sources.point.numpy()["x"]
-    cells = np.clip(np.ceil(np.ptp(x, axis=0) / (2.0 * spacing)), 1, 512).astype(int).tolist()
-    return tuple(cells + [1] * (3 - dim))
+    cells = np.maximum(np.ceil(np.ptp(x, axis=0) / (2.0 * spacing)), 1.0)
+    cells *= min(1.0, len(x) / cells.prod()) ** (1.0 / dim)
+    return tuple(np.ceil(cells).astype(int).tolist() + [1] * (3 - dim))
 
 
 class _Kernels:

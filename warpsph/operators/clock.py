@@ -7,6 +7,7 @@ surface, or because a value is not finite.
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
@@ -18,6 +19,15 @@ from ..scene.dimension import Continuum
 LONGEST_RUN = 256  # steps
 HALF, END = 0, 1  # rows of `Clock.drive`
 STAGES = 5  # t, t + Δt/4, …, t + Δt: the classical scheme needs both ends and the middle of each half step
+
+
+class Outcome(NamedTuple):
+    """Number of steps made, and why the host is needed now."""
+
+    made: int
+    lists_outdated: bool
+    surface_outdated: bool
+    non_finite: bool
 
 
 class Clock:
@@ -51,11 +61,10 @@ class Clock:
         self._force = wp.zeros(STAGES, dtype=vector, device=device)
         self._drive = wp.zeros(2 * columns, dtype=real, device=device)
         self.drive = self._drive.reshape((2, columns))
-        self._flags = wp.zeros(3, dtype=wp.int32, device=device)
-        self._steps = wp.zeros(2, dtype=wp.int32, device=device)  # made, to make
+        self._status = wp.zeros(5, dtype=wp.int32, device=device)  # steps made, steps to make, three flags
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
         self.first_half, self.second_half = self._force[:3], self._force[2:]
-        self.lists_outdated, self.surface_outdated, self.non_finite = (self._flags[k : k + 1] for k in range(3))
+        self.lists_outdated, self.surface_outdated, self.non_finite = (self._status[k : k + 1] for k in (2, 3, 4))
         self._tick = _tick_kernel(continuum, precision)
         self.kernels = (self._tick,)
 
@@ -68,30 +77,26 @@ class Clock:
             _put(self._forces[: len(times)], forces)
             _put(self._force, forces[0])
         if self._functions:
-            drives = np.array(
-                [[self._value(f, t) for t in (s + half, s + dt) for f in self._functions] for s in times]
-            )
+            ends = [(t + half, t + dt) for t in times]
+            drives = np.array([[_value(f, t) for t in row for f in self._functions] for row in ends])
             _put(self._drives[: len(times)], drives)
             _put(self._drive, drives[0])
-        _put(self._steps, (0, len(times)))
-        _put(self.going, 1)
-
-    @staticmethod
-    def _value(function, t: float) -> float:
-        return function(t) if callable(function) else function
+        _put(self._status[:2], (0, len(times)))
+        _put(self.going, (1,))
 
     def tick(self) -> None:
         """Close a step: go on to the next, or end."""
-        inputs = [self._forces, self._drives, self._flags, self._force, self._drive, self._steps, self.going]
+        inputs = [self._forces, self._drives, self._force, self._drive, self._status, self.going]
         self._launcher.launch(self._tick, self.going, inputs)
 
-    def made(self) -> int:
-        """Number of steps made since `begin`."""
-        return int(self._steps.numpy()[0])
+    def outcome(self) -> Outcome:
+        """What the steps since `begin` came to."""
+        made, _, *flags = self._status.numpy().tolist()
+        return Outcome(made, *map(bool, flags))
 
-    def flags(self) -> tuple[bool, bool, bool]:
-        """Whether lists are outdated, whether the free surface is, and whether some value is not finite."""
-        return tuple(flag != 0 for flag in self._flags.numpy().tolist())
+
+def _value(function, t: float) -> float:
+    return function(t) if callable(function) else function
 
 
 def _put(array: wp.array, values) -> None:
@@ -99,7 +104,7 @@ def _put(array: wp.array, values) -> None:
     if array.device.is_cpu:
         array.numpy()[...] = values
     else:
-        array.assign(np.broadcast_to(values, array.numpy().shape))
+        array.assign(np.array(values))
 
 
 @cache
@@ -111,18 +116,14 @@ def _tick_kernel(continuum: Continuum, precision: Precision):
         first: int,
         forces: wp.array2d(dtype=vector),
         drives: wp.array2d(dtype=real),
-        flags: wp.array(dtype=wp.int32),
         force: wp.array(dtype=vector),
         drive: wp.array(dtype=real),
-        steps: wp.array(dtype=wp.int32),
+        status: wp.array(dtype=wp.int32),
         going: wp.array(dtype=wp.int32),
     ):
-        made = steps[0] + 1
-        steps[0] = made
-        calls = wp.int32(0)
-        for k in range(flags.shape[0]):
-            calls += flags[k]
-        if made >= steps[1] or calls > 0:
+        made = status[0] + 1
+        status[0] = made
+        if made >= status[1] or status[2] + status[3] + status[4] > 0:
             going[0] = 0
             return
         for k in range(force.shape[0]):

@@ -145,13 +145,13 @@ class Simulation:
 
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        made = self._stepper.advance(times, dt)
-        self.steps += made
-        self.time = times[made - 1] + dt
+        outcome = self._stepper.advance(times, dt)
+        self.steps += outcome.made
+        self.time = times[outcome.made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)
         self.longest_step = max(self.longest_step, dt)
         self.wall_time += clock.perf_counter() - begin
-        if self._stepper.clock.flags()[-1]:
+        if outcome.non_finite:
             node = self._first_non_finite()
             raise NonFiniteError(self.steps, self.time, node, self.lattice.nodes[node])
 

@@ -16,7 +16,7 @@ from ..nodes.node_sets import (
     node_types,
 )
 from ..operators.cell_motion import CellMotion
-from ..operators.clock import Clock
+from ..operators.clock import Clock, Outcome
 from ..operators.conditions import Conditions
 from ..operators.free_surface import FreeSurfaceConditions
 from ..operators.motion import Motion, NoMotion, centre_kernel
@@ -87,7 +87,7 @@ class Stepper:
         self.conditions.apply(self.nodes)
         self._initial_spin(scene)
 
-    def advance(self, times: Sequence[float], dt: float) -> int:
+    def advance(self, times: Sequence[float], dt: float) -> Outcome:
         """Make a step from each of the times to Δt later; fewer when the host is needed before.
 
         Args:
@@ -95,16 +95,16 @@ class Stepper:
             dt: time step [s].
 
         Returns:
-            The number of steps made, at least one. When a value is not finite, the last one is the first with it.
+            How many were made, at least one. When a value is not finite, the last step is the first with it.
         """
         self.clock.begin(times, dt)
         self._record(dt).run()
-        lists_outdated, surface_outdated, non_finite = self.clock.flags()
-        if lists_outdated and not non_finite:
+        outcome = self.clock.outcome()
+        if outcome.lists_outdated and not outcome.non_finite:
             self._build_lists()
-        elif surface_outdated:
+        elif outcome.surface_outdated:
             self.conditions.locate(self.nodes)
-        return self.clock.made()
+        return outcome
 
     def step(self, dt: float) -> None:
         """Advance the nodes by dt [s]; the numbers are those of METHOD section 3."""
