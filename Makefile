@@ -4,7 +4,7 @@ VENV ?= .venv
 OUT ?= runs/strip_footing
 BIN = $(VENV)/bin
 
-.PHONY: demo test test-long lint clean
+.PHONY: demo test test-long gpu lint clean
 
 demo: $(VENV)/demo
 	$(BIN)/warpsph run strip_footing --out $(OUT)
@@ -15,6 +15,12 @@ test: $(VENV)/test
 
 test-long: $(VENV)/test
 	$(BIN)/python -m pytest -m long
+
+# On a machine with a CUDA device: the tests that run there, then its benchmark of record.
+gpu: $(VENV)/test
+	$(BIN)/python -m pytest -m cuda
+	$(BIN)/python tools/benchmark.py --devices cuda:0 --dimensions 2,3 --materials viscoplastic \
+		--nodes 1e3,1e4,1e5,1e6,4e6 --out runs/benchmark_gpu.json
 
 lint: $(VENV)/test
 	$(BIN)/ruff check .

@@ -1,5 +1,7 @@
 """Threads and recordings: they change the speed and nothing else."""
 
+import os
+import signal
 import threading
 
 import numpy as np
@@ -119,6 +121,32 @@ def test_an_observer_is_told_after_the_first_step_at_its_time():
     assert watch.steps[before:] == list(range(watch.steps[before], simulation.steps + 1))
     assert watch.times[before] < watch.next_time + simulation.longest_step
     assert before < 0.5 * watch.steps[before], "before, steps are made many at a time"
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_interrupt_waits_for_the_steps_that_run(threads):
+    """Ctrl-C in a program of one's own, at many moments: nothing is lost, and the run can go on."""
+    expected = state_after(Simulation(pressed(), device="cpu", threads=1))
+    simulation, interrupts, stop = Simulation(pressed(), device="cpu", threads=threads), 0, threading.Event()
+
+    def annoy():
+        while not stop.wait(0.002):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    finished, annoyance = None, threading.Thread(target=annoy)
+    annoyance.start()
+    try:
+        while finished is None:
+            try:
+                simulation.run()
+                stop.set()
+                annoyance.join()
+                finished = state_after(simulation)
+            except KeyboardInterrupt:
+                interrupts += 1
+    finally:
+        stop.set()
+    assert finished == expected and interrupts > 0
 
 
 def test_large_bodies_look_up_often(monkeypatch):

@@ -19,6 +19,7 @@ from ..scene.validate import instance, number, vector
 from ..step.step import Stepper
 from .device import choose_device, choose_threads
 from .fields import fields_of
+from .interrupts import held_back
 from .state import arrays, numbers, restore
 from .time_step import ROUNDING, Leg, divide, time_step_limit
 
@@ -103,7 +104,8 @@ class Simulation:
         dt = self.time_step_limit
         if time_step is not None:
             dt = number("time_step", time_step, above=0.0, at_most=self.time_step_limit)
-        self._advance([self.time], dt)
+        with held_back():
+            self._advance([self.time], dt)
 
     def run(self, until: float | None = None, observers: Iterable[Observer] = ()) -> None:
         """Advance in equal steps until a time, telling the observers on the way.
@@ -125,10 +127,11 @@ class Simulation:
         if leg is None or leg.end != end or leg.time_after(self.steps) != self.time:
             leg = self._leg = self._leg_to(end, self.time_step_limit)
         while self.steps < leg.first + leg.steps:
-            self._advance(self._starts(leg, observers), leg.time_step)
-            self.time = leg.time_after(self.steps)
-            if leg.time_step > self.time_step_limit * (1.0 + ROUNDING) and self.time < end:
-                leg = self._leg = self._leg_to(end, HEADROOM * self.time_step_limit)
+            with held_back():
+                self._advance(self._starts(leg, observers), leg.time_step)
+                self.time = leg.time_after(self.steps)
+                if leg.time_step > self.time_step_limit * (1.0 + ROUNDING) and self.time < end:
+                    leg = self._leg = self._leg_to(end, HEADROOM * self.time_step_limit)
             for observer in observers:
                 observer.observe(self)
 
