@@ -67,9 +67,10 @@ def run(
     for name in (SUMMARY, *PICTURES):
         (folder / name).unlink(missing_ok=True)  # a former run's would be taken for this one's
     store(folder, file, scene, parameters, settings)
+    where = simulation.device.alias + (f", {simulation.threads} threads" if simulation.threads > 1 else "")
     say(
         f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
-        f"{simulation.precision.name} on {simulation.device.alias}, time step {simulation.time_step_limit:.4g} s "
+        f"{simulation.precision.name} on {where}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )
     if simulation.steps:

@@ -43,6 +43,7 @@ def summarise(
         "warp_version": wp.config.version,
         "device": simulation.device.alias,
         "device_name": simulation.device.name,
+        "threads": simulation.threads,
         "precision": simulation.precision.name,
         "nodes": len(simulation.lattice.nodes),
         "auxiliary_nodes": len(simulation.lattice.cells),
