@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.precision import Precision
 from ..scene.dimension import Continuum
 from .node_sets import node_types
@@ -109,12 +110,12 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
             p[k] = wp.float32(r[k])
         return p
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def copy_points(points: wp.array(dtype=Point), origin: vector, out: wp.array(dtype=wp.vec3)):
         i = wp.tid()
         out[i] = grid_point(points[i].x, origin)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def count(
         grid: wp.uint64,
         grid_points: wp.array(dtype=wp.vec3),
@@ -134,7 +135,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
                 found += 1
         counts[i] = found
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def fill(
         grid: wp.uint64,
         grid_points: wp.array(dtype=wp.vec3),

@@ -9,6 +9,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
@@ -68,7 +69,7 @@ def _kernels(continuum, precision):
     determinant, corners = determinant_of(dim, precision), 2**dim
     edges_of = edges_function(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def shift(dt: real, nodes: MaterialNodes):
         i = wp.tid()
         u = nodes.displacement[i] + dt * nodes.half_velocity[i]
@@ -87,7 +88,7 @@ def _kernels(continuum, precision):
                 most = wp.max(most, real(wp.static(0.5**0.5)) * diagonal)
         return most
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def measure(
         reference_density: real,
         initial_volume: wp.array(dtype=real),
@@ -113,7 +114,7 @@ def _kernels(continuum, precision):
         auxiliary.point[a].volume = volume
         auxiliary.density[a] = reference_density * initial_volume[a] / volume
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def share(
         support: real,
         half_skin: real,

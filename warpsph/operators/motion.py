@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
@@ -139,7 +140,7 @@ def _move_kernel(continuum: Continuum, precision: Precision):
     determinant = determinant_of(dim, precision)
     identity = types.tensor(np.eye(dim))
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def move(
         reference_density: real,
         initial_smoothing_length: wp.array(dtype=real),
@@ -179,7 +180,7 @@ def centre_kernel(continuum: Continuum, precision: Precision):
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
     corners = 2**continuum.dim
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def centre(nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
         a = wp.tid()
         x = vector()

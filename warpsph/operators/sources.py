@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.linear_algebra import rotation_of
 from ..ground.materials.law import Law
@@ -200,7 +201,7 @@ def source_kernel(
         v4 = b2 - c * (v + dt * v3)
         return v + (dt / real(6.0)) * (v1 + real(2.0) * v2 + real(2.0) * v3 + v4)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def source_half_step(
         material: Parameters,
         body_force_start: vector,

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
@@ -49,7 +50,7 @@ def _spacing_kernel(continuum: Continuum, precision: Precision):
     types, real = node_types(continuum, precision), precision.real
     edges_of, frame_of = edges_function(continuum, precision), frame_function(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def spacing(nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)):
         a = wp.tid()
         frame = frame_of(edges_of(a, auxiliary, nodes.point))

@@ -48,6 +48,7 @@ class Sweep:
 # A neighbour on the very edge of the support is outside, whatever its last bits say: at h = 0.5 Δx the Gaussian's
 # support ends on the lattice points at 1.5 Δx, and taking some of them in by rounding smears a front.
 EDGE = 1.0 - 1e-4
+BATCH = 16
 
 
 @cache
@@ -55,7 +56,8 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     """The pass for one smoothing function."""
     types = node_types(continuum, precision)
     real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
-    phi_gradient, Point = types.phi_gradient, types.Point
+    Point, gradient_rows = types.Point, precision.mat(continuum.dim, types.size)
+    batch = precision.vec(BATCH)
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
     support_squared = EDGE * KERNELS[kernel].support ** 2
@@ -67,7 +69,25 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         w_phi: phi  # Σ V W (φ_J − base)
         g: vector  # Σ V ∇W
         g_x: tensor  # Σ V ∇W ⊗ (x_J − x_I)
-        g_phi: phi_gradient  # Σ V (φ_J − base) ⊗ ∇W
+        g_phi: gradient_rows  # Σ V ∇W ⊗ (φ_J − base), so that a φ_J is read and added up in one piece
+
+    @wp.func
+    def weigh(x: vector, metric: tensor, first: int, count: int, pairs: PairList, sources: wp.array(dtype=Point)):
+        """W and −W′/ξ of the neighbours from `first` on."""
+        w, g = batch(), batch()
+        n = wp.int32(0)
+        while n < count:
+            xi = metric * (sources[pairs.index[first + n]].x - x)
+            w[n] = wp.dot(xi, xi)
+            n += 1
+        n = wp.int32(0)
+        while n < wp.static(BATCH):
+            s = w[n]
+            w_n, g_n = weights(s)
+            w[n] = wp.where(s < real(support_squared), w_n, real(0.0))
+            g[n] = wp.where(s < real(support_squared), g_n, real(0.0))
+            n += 1
+        return w, g
 
     @wp.func
     def collect(
@@ -75,21 +95,24 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
     ):
         sums = Sums()
         sums.base = base
-        for k in range(pairs.start[target], pairs.start[target + 1]):
-            neighbour = sources[pairs.index[k]]
-            r = neighbour.x - x
-            xi = metric * r
-            s = wp.dot(xi, xi)
-            if s < real(support_squared):
-                w, g = weights(s)
-                w *= neighbour.volume
-                grad_w = (g * neighbour.volume) * r
-                sums.w += w
+        first, end = int(pairs.start[target]), pairs.start[target + 1]
+        while first < end:
+            count = wp.min(end - first, wp.static(BATCH))
+            w, g = weigh(x, metric, first, count, pairs, sources)
+            n = wp.int32(0)
+            while n < count:
+                neighbour = sources[pairs.index[first + n]]
+                r = neighbour.x - x
+                w_n, g_n = w[n] * neighbour.volume, g[n] * neighbour.volume
                 difference = neighbour.phi - base
-                sums.w_phi += w * difference
+                sums.w += w_n
+                sums.w_phi += w_n * difference
+                grad_w = g_n * r
                 sums.g += grad_w
                 sums.g_x += wp.outer(grad_w, r)
-                sums.g_phi += wp.outer(difference, grad_w)
+                sums.g_phi += wp.outer(grad_w, difference)
+                n += 1
+            first += count
         return sums
 
     @wp.func
@@ -101,7 +124,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
 
     @wp.func
     def gradient(sums: Sums, own: phi):
-        return (sums.g_phi - wp.outer(own - sums.base, sums.g)) * inverse(sums.g_x)
+        return wp.transpose(inverse(sums.g_x) * (sums.g_phi - wp.outer(sums.g, own - sums.base)))
 
     @wp.func
     def round_metric(h: real):
@@ -115,7 +138,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         def metric_of(frame: tensor, h: real):
             if wp.ddot(frame, frame) <= real(0.0):
                 return round_metric(h)
-            return frame / real(ratio)
+            return real(wp.static(1.0 / ratio)) * frame
 
         return metric_of
 

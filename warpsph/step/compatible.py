@@ -15,6 +15,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
@@ -115,7 +116,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     metric_of = parts.cell_metric(ratio)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_auxiliary(
         material: Parameters,
         dt: real,
@@ -169,7 +170,7 @@ def _to_nodes_kernel(
     collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_nodes(
         material: Parameters,
         conditions: Table,

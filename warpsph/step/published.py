@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
@@ -67,7 +68,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_auxiliary(
         material: Parameters, dt: real, pairs: PairList, nodes: MaterialNodes, auxiliary: AuxiliaryNodes
     ):
@@ -102,7 +103,7 @@ def _to_nodes_kernel(
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_nodes(
         material: Parameters,
         conditions: Table,
