@@ -48,16 +48,28 @@ class Sweep:
 # A neighbour on the very edge of the support is outside, whatever its last bits say: at h = 0.5 Δx the Gaussian's
 # support ends on the lattice points at 1.5 Δx, and taking some of them in by rounding smears a front.
 EDGE = 1.0 - 1e-4
-BATCH = 16
+
+# Neighbours whose weights are found side by side, for SIMD: the least power of two that holds the 12 of a point on
+# a lattice in the plane. A GPU has its threads side by side instead.
+CPU_BATCH = 16
+GPU_BATCH = 1
+
+
+def batch_on(device: wp.Device) -> int:
+    """How many neighbours' weights are found at a time."""
+    return CPU_BATCH if device.is_cpu else GPU_BATCH
 
 
 @cache
-def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
-    """The pass for one smoothing function."""
+def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = CPU_BATCH) -> Sweep:
+    """The pass for one smoothing function, with so many neighbours' weights found at a time.
+
+    Loops are written with `while` and without branches, since that is what compilers turn into SIMD.
+    """
     types = node_types(continuum, precision)
     real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
     Point, gradient_rows = types.Point, precision.mat(continuum.dim, types.size)
-    batch = precision.vec(BATCH)
+    real_batch = precision.vec(batch)
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
     support_squared = EDGE * KERNELS[kernel].support ** 2
@@ -73,15 +85,15 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
 
     @wp.func
     def weigh(x: vector, metric: tensor, first: int, count: int, pairs: PairList, sources: wp.array(dtype=Point)):
-        """W and −W′/ξ of the neighbours from `first` on."""
-        w, g = batch(), batch()
+        """W and −W′/ξ of so many neighbours from `first` on, zero outside the support."""
+        w, g = real_batch(), real_batch()
         n = wp.int32(0)
         while n < count:
             xi = metric * (sources[pairs.index[first + n]].x - x)
             w[n] = wp.dot(xi, xi)
             n += 1
         n = wp.int32(0)
-        while n < wp.static(BATCH):
+        while n < wp.static(batch):
             s = w[n]
             w_n, g_n = weights(s)
             w[n] = wp.where(s < real(support_squared), w_n, real(0.0))
@@ -97,7 +109,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str) -> Sweep:
         sums.base = base
         first, end = int(pairs.start[target]), pairs.start[target + 1]
         while first < end:
-            count = wp.min(end - first, wp.static(BATCH))
+            count = wp.min(end - first, wp.static(batch))
             w, g = weigh(x, metric, first, count, pairs, sources)
             n = wp.int32(0)
             while n < count:

@@ -12,7 +12,7 @@ from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
-from ..operators.sweep import sweep
+from ..operators.sweep import Sweep, batch_on, sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
 from ..scene.scene import Scene
@@ -35,11 +35,12 @@ class PublishedFluxes:
         self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, device: wp.Device
     ):
         continuum, numerics = scene.lattice.continuum, scene.numerics
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
+        parts = sweep(continuum, precision, numerics.kernel, batch_on(device))
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
             continuum,
             precision,
-            numerics.kernel,
+            parts,
             law.Parameters,
             numerics.velocity_scheme,
             scene.large_displacements,
@@ -61,10 +62,10 @@ class PublishedFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type):
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Sweep, Parameters: type):
     types = node_types(continuum, precision)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
 
@@ -86,7 +87,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 def _to_nodes_kernel(
     continuum: Continuum,
     precision: Precision,
-    kernel: str,
+    parts: Sweep,
     Parameters: type,
     scheme: str,
     moves: bool,
@@ -97,7 +98,7 @@ def _to_nodes_kernel(
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply = conditions.Table, conditions.apply
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
