@@ -80,13 +80,13 @@ def _kernels(continuum, precision):
     def longest(edges: tensor):
         """The longest of a cell's edges and, over √2, of the diagonals of its faces: about its largest stretch."""
         e = wp.transpose(edges)
-        most = real(0.0)
+        most2 = real(0.0)
         for b in range(wp.static(dim)):
-            most = wp.max(most, wp.length(e[b]))
+            most2 = wp.max(most2, wp.length_sq(e[b]))
             for c in range(b):
-                diagonal = wp.max(wp.length(e[b] + e[c]), wp.length(e[b] - e[c]))
-                most = wp.max(most, real(wp.static(0.5**0.5)) * diagonal)
-        return most
+                diagonal2 = wp.max(wp.length_sq(e[b] + e[c]), wp.length_sq(e[b] - e[c]))
+                most2 = wp.max(most2, real(0.5) * diagonal2)
+        return wp.sqrt(most2)
 
     @forward_kernel
     def measure(
