@@ -12,13 +12,12 @@ CPU_FLAGS = "-ffp-contract=fast -fno-signed-zeros"
 
 
 def forward_kernel(function: Callable) -> wp.Kernel:
-    """`wp.kernel` in a module of its own, without derivatives, with `CPU_FLAGS` where Warp takes any."""
-    options = {}
-    if hasattr(wp.config, "cpu_compiler_flags") and "module_options" in inspect.signature(wp.kernel).parameters:
-        given = wp.config.cpu_compiler_flags
-        flags = f"{'-march=native' if given is None else given} {CPU_FLAGS}"
-        options["module_options"] = {"cpu_compiler_flags": flags}
-    return wp.kernel(module="unique", enable_backward=False, **options)(function)
+    """`wp.kernel` in a module of its own, without derivatives, with `CPU_FLAGS` after those set for Warp."""
+    given = wp.config.cpu_compiler_flags
+    flags = f"{'-march=native' if given is None else given} {CPU_FLAGS}"
+    return wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": flags})(
+        function
+    )
 
 
 def load_kernels(kernels: Iterable[wp.Kernel], device: wp.Device) -> None:

@@ -103,7 +103,8 @@ def _kernels(continuum, precision):
         a = wp.tid()
         x = vector()
         for k in range(wp.static(corners)):
-            x += nodes.point[auxiliary.cell[a, k]].x
+            i = auxiliary.cell[a, k]
+            x += nodes.point[i].x
         auxiliary.point[a].x = real(wp.static(1.0 / corners)) * x
         edges = edges_of(a, auxiliary, nodes.point)
         h = ratio * longest(edges)

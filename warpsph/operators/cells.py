@@ -71,7 +71,8 @@ def edges_function(continuum: Continuum, precision: Precision) -> wp.Function:
     def edges_of(a: int, auxiliary: types.AuxiliaryNodes, nodes: wp.array(dtype=types.Point)):
         edges = types.tensor()
         for k in range(wp.static(corners)):
-            edges += wp.outer(nodes[auxiliary.cell[a, k]].x, side[k])
+            i = auxiliary.cell[a, k]
+            edges += wp.outer(nodes[i].x, side[k])
         return precision.real(wp.static(2.0 / corners)) * edges
 
     return edges_of

@@ -89,7 +89,8 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
         w, g = real_batch(), real_batch()
         n = wp.int32(0)
         while n < count:
-            xi = metric * (sources[pairs.index[first + n]].x - x)
+            j = pairs.index[first + n]
+            xi = metric * (sources[j].x - x)
             w[n] = wp.dot(xi, xi)
             n += 1
         n = wp.int32(0)
