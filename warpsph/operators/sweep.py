@@ -86,19 +86,18 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
     @wp.func
     def weigh(x: vector, metric: tensor, first: int, count: int, pairs: PairList, sources: wp.array(dtype=Point)):
         """W and −W′/ξ of so many neighbours from `first` on, zero outside the support."""
-        w, g = real_batch(), real_batch()
+        xi2, w, g = real_batch(), real_batch(), real_batch()
         n = wp.int32(0)
         while n < count:
             j = pairs.index[first + n]
             xi = metric * (sources[j].x - x)
-            w[n] = wp.dot(xi, xi)
+            xi2[n] = wp.dot(xi, xi)
             n += 1
         n = wp.int32(0)
         while n < wp.static(batch):
-            s = w[n]
-            w_n, g_n = weights(s)
-            w[n] = wp.where(s < real(support_squared), w_n, real(0.0))
-            g[n] = wp.where(s < real(support_squared), g_n, real(0.0))
+            w_n, g_n = weights(xi2[n])
+            w[n] = wp.where(xi2[n] < real(support_squared), w_n, real(0.0))
+            g[n] = wp.where(xi2[n] < real(support_squared), g_n, real(0.0))
             n += 1
         return w, g
 
