@@ -12,7 +12,7 @@ from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
 from warpsph.nodes.neighbours import PairList
 from warpsph.nodes.node_sets import node_types
 from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
-from warpsph.operators.sweep import sweep
+from warpsph.operators.sweep import CPU_BATCH, GPU_BATCH, sweep
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
 from warpsph.scene.material import Elastic as ElasticMaterial
 from warpsph.scene.material import PerzynaVonMises
@@ -74,10 +74,10 @@ def test_pair_lists_hold_every_neighbour_once(device, precision, shape):
             assert set(inside) <= set(listed)
 
 
-def probe_kernel(dim, precision, kernel):
+def probe_kernel(dim, precision, kernel, batch):
     """A kernel that writes the value and the gradient of one sweep."""
     continuum, real = CONTINUA[dim], PRECISIONS[precision]
-    types, parts = node_types(continuum, real), sweep(continuum, real, kernel)
+    types, parts = node_types(continuum, real), sweep(continuum, real, kernel, batch)
     collect, value, gradient, round_metric = parts.collect, parts.value, parts.gradient, parts.round_metric
     Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
 
@@ -100,9 +100,9 @@ def probe_kernel(dim, precision, kernel):
     return probe, types
 
 
-def run_sweep(dim, precision, kernel, x, h, sources, own, base):
+def run_sweep(dim, precision, kernel, x, h, sources, own, base, batch=CPU_BATCH):
     """Value and gradient at points x from source points (position, φ), every pair listed; outputs poisoned."""
-    probe, types = probe_kernel(dim, precision, kernel)
+    probe, types = probe_kernel(dim, precision, kernel, batch)
     real = PRECISIONS[precision]
     points = np.zeros(len(sources[0]), dtype=types.Point.numpy_dtype())
     points["x"], points["volume"], points["phi"] = sources[0], sources[2], sources[1]
@@ -143,6 +143,45 @@ def test_gradients_of_linear_fields_and_values_of_constants_are_exact(precision,
     uniform = (sources, np.tile(constant, (len(sources), 1)), volumes)
     values, _ = run_sweep(dim, precision, kernel, nodes.nodes, h, uniform, own, 0 * constant)
     np.testing.assert_allclose(values, np.tile(constant, (len(own), 1)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_nothing_depends_on_how_many_weights_are_found_at_a_time(kernel):
+    """A GPU finds one, a CPU 16; 40 neighbours here, most of them outside the support of some points."""
+    rng = np.random.default_rng(7)
+    sources = (rng.uniform(size=(40, 2)), rng.normal(size=(40, 6)), rng.uniform(0.5, 1.0, size=40))
+    arguments = (
+        2,
+        "float64",
+        kernel,
+        rng.uniform(size=(9, 2)),
+        0.3,
+        sources,
+        rng.normal(size=(9, 6)),
+        np.zeros(6),
+    )
+    expected = run_sweep(*arguments, batch=GPU_BATCH)
+    assert np.ptp(expected[0]) > 0.1
+    for batch in (3, CPU_BATCH):
+        for found, one_by_one in zip(run_sweep(*arguments, batch=batch), expected, strict=True):
+            np.testing.assert_allclose(found, one_by_one, rtol=1e-11, atol=1e-11)
+
+
+def test_the_gaussian_is_one_as_far_as_it_reaches(precision):
+    """Squared four times, so that rounding of the polynomial counts 16 times, in some ten operations each."""
+    real = PRECISIONS[precision]
+    weights = SMOOTHING_FUNCTIONS["gaussian"](real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def probe(s: wp.array(dtype=real.real), out: wp.array(dtype=real.real)):
+        w, _ = weights(s[wp.tid()])
+        out[wp.tid()] = w
+
+    s = np.linspace(0.0, KERNELS["gaussian"].support ** 2, 1001).astype(real.dtype)
+    out = wp.full(len(s), np.nan, dtype=real.real, device="cpu")
+    wp.launch(probe, len(s), inputs=[wp.array(s, dtype=real.real, device="cpu")], outputs=[out], device="cpu")
+    allowed = max(5e-14, 50 * np.finfo(real.dtype).eps)
+    np.testing.assert_allclose(out.numpy(), np.exp(-s.astype(float)), rtol=allowed)
 
 
 def test_a_point_without_neighbours_keeps_its_value_and_has_no_gradient():

@@ -1,11 +1,23 @@
-"""Compiling and loading kernels before they are needed, several at a time."""
+"""How kernels are compiled, and loading them before they are needed, several at a time."""
 
 import inspect
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import warp as wp
+
+# Fused multiplications and additions, and −0 taken for 0, gain a tenth; NaN and infinities stay what they are.
+CPU_FLAGS = "-ffp-contract=fast -fno-signed-zeros"
+
+
+def forward_kernel(function: Callable) -> wp.Kernel:
+    """`wp.kernel` in a module of its own, without derivatives, with `CPU_FLAGS` after those set for Warp."""
+    given = wp.config.cpu_compiler_flags
+    flags = f"{'-march=native' if given is None else given} {CPU_FLAGS}"
+    return wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": flags})(
+        function
+    )
 
 
 def load_kernels(kernels: Iterable[wp.Kernel], device: wp.Device) -> None:

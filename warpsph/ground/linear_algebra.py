@@ -27,16 +27,16 @@ def symmetric_inverse(dim: int, precision: Precision) -> wp.Function:
         tr = wp.trace(a)
         if tr <= real(0.0):
             return matrix()
-        scale = tr / real(dim)
-        n = a / scale
+        per_scale = real(dim) / tr
+        n = per_scale * a
         if wp.static(dim == 1):
             n[0, 0] = real(1.0) / n[0, 0]
-            return n / scale
+            return per_scale * n
         else:
             if wp.determinant(n) < real(RANK_TOLERANCE):
                 for k in range(wp.static(dim)):
                     n[k, k] += real(wp.static(REGULARISATION * dim))
-            return wp.inverse(n) / scale
+            return per_scale * wp.inverse(n)
 
     return inverse
 

@@ -35,44 +35,29 @@ def unknowns(continuum: Continuum, precision: Precision) -> Unknowns:
     """The unknowns of one continuum in one precision."""
     d, s = continuum.dim, continuum.stress_size
     vector, stress_vector, phi = precision.vec(d), precision.vec(s), precision.vec(d + s)
-    tensor, gradient_of_stress = precision.mat(d, d), precision.mat(s, d)
     gradient = precision.mat(d + s, d)
 
     @wp.func
     def velocity(values: phi):
-        v = vector()
-        for k in range(wp.static(d)):
-            v[k] = values[k]
-        return v
+        return values[: wp.static(d)]
 
     @wp.func
     def stress(values: phi):
-        sigma = stress_vector()
-        for k in range(wp.static(s)):
-            sigma[k] = values[wp.static(d) + k]
-        return sigma
+        return values[wp.static(d) :]
 
     @wp.func
     def join(v: vector, sigma: stress_vector):
         values = phi()
-        for k in range(wp.static(d)):
-            values[k] = v[k]
-        for k in range(wp.static(s)):
-            values[wp.static(d) + k] = sigma[k]
+        values[: wp.static(d)] = v
+        values[wp.static(d) :] = sigma
         return values
 
     @wp.func
     def velocity_gradient(grad: gradient):
-        L = tensor()
-        for k in range(wp.static(d)):
-            L[k] = grad[k]
-        return L
+        return grad[: wp.static(d)]
 
     @wp.func
     def stress_gradient(grad: gradient):
-        g = gradient_of_stress()
-        for k in range(wp.static(s)):
-            g[k] = grad[wp.static(d) + k]
-        return g
+        return grad[wp.static(d) :]
 
     return Unknowns(phi, gradient, velocity, stress, join, velocity_gradient, stress_gradient)

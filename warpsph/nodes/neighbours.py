@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.precision import Precision
 from ..scene.dimension import Continuum
 from .node_sets import node_types
@@ -109,12 +110,12 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
             p[k] = wp.float32(r[k])
         return p
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def copy_points(first: int, points: wp.array(dtype=Point), origin: vector, out: wp.array(dtype=wp.vec3)):
         i = first + wp.tid()
         out[i] = grid_point(points[i].x, origin)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def count(
         first: int,
         grid: wp.uint64,
@@ -135,7 +136,7 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
                 found += 1
         counts[i] = found
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def fill(
         first: int,
         grid: wp.uint64,

@@ -9,6 +9,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
@@ -68,7 +69,7 @@ def _kernels(continuum, precision):
     determinant, corners = determinant_of(dim, precision), 2**dim
     edges_of = edges_function(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def shift(first: int, dt: real, nodes: MaterialNodes):
         i = first + wp.tid()
         u = nodes.displacement[i] + dt * nodes.half_velocity[i]
@@ -79,15 +80,15 @@ def _kernels(continuum, precision):
     def longest(edges: tensor):
         """The longest of a cell's edges and, over √2, of the diagonals of its faces: about its largest stretch."""
         e = wp.transpose(edges)
-        most = real(0.0)
+        most2 = real(0.0)
         for b in range(wp.static(dim)):
-            most = wp.max(most, wp.length(e[b]))
+            most2 = wp.max(most2, wp.length_sq(e[b]))
             for c in range(b):
-                diagonal = wp.max(wp.length(e[b] + e[c]), wp.length(e[b] - e[c]))
-                most = wp.max(most, real(wp.static(0.5**0.5)) * diagonal)
-        return most
+                diagonal2 = wp.max(wp.length_sq(e[b] + e[c]), wp.length_sq(e[b] - e[c]))
+                most2 = wp.max(most2, real(0.5) * diagonal2)
+        return wp.sqrt(most2)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def measure(
         first: int,
         reference_density: real,
@@ -103,7 +104,8 @@ def _kernels(continuum, precision):
         a = first + wp.tid()
         x = vector()
         for k in range(wp.static(corners)):
-            x += nodes.point[auxiliary.cell[a, k]].x
+            i = auxiliary.cell[a, k]
+            x += nodes.point[i].x
         auxiliary.point[a].x = real(wp.static(1.0 / corners)) * x
         edges = edges_of(a, auxiliary, nodes.point)
         h = ratio * longest(edges)
@@ -114,7 +116,7 @@ def _kernels(continuum, precision):
         auxiliary.point[a].volume = volume
         auxiliary.density[a] = reference_density * initial_volume[a] / volume
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def share(
         first: int,
         support: real,

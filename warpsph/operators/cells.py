@@ -71,7 +71,8 @@ def edges_function(continuum: Continuum, precision: Precision) -> wp.Function:
     def edges_of(a: int, auxiliary: types.AuxiliaryNodes, nodes: wp.array(dtype=types.Point)):
         edges = types.tensor()
         for k in range(wp.static(corners)):
-            edges += wp.outer(nodes[auxiliary.cell[a, k]].x, side[k])
+            i = auxiliary.cell[a, k]
+            edges += wp.outer(nodes[i].x, side[k])
         return precision.real(wp.static(2.0 / corners)) * edges
 
     return edges_of
@@ -112,6 +113,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     number = len(subsets)
     columns = max(1, number)  # a bar has no such mode, and Warp no matrix without columns
     alternating = np.stack([end[:, s].prod(axis=1) for s in subsets] or [np.zeros(corners)], axis=1)
+    slopes_of_modes = precision.mat(columns, dim)
     phi_modes, position_modes = precision.mat(types.size, columns), precision.mat(dim, columns)
     side = corner_sides(continuum, precision)
     sign = precision.mat(corners, columns)(*alternating.ravel().tolist())
@@ -145,19 +147,18 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
         return share * mean, cell
 
     @wp.func
-    def beyond_middle(modes: phi_modes, end: types.vector, share: real):
-        """A share of what ∂f/∂ξ_a at a corner has beyond that in the middle, for each other axis."""
-        part = phi_gradient()
+    def mode_slopes(end: types.vector, share: real):
+        """∂/∂ξ_a of mode S a share of the way to a corner, in row S and column a."""
+        slopes = slopes_of_modes()
         for s in range(wp.static(number)):
             for a in range(wp.static(dim)):
                 if wp.static(a in subsets[s]):
-                    factor = real(2.0)
+                    slope = real(2.0)
                     for b in range(wp.static(dim)):
                         if wp.static(b != a and b in subsets[s]):
-                            factor *= share * end[b]
-                    for row in range(wp.static(types.size)):
-                        part[row, a] += factor * modes[row, s]
-        return part
+                            slope *= share * end[b]
+                    slopes[s, a] = slope
+        return slopes
 
     @wp.func
     def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
@@ -171,9 +172,10 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                 frame += cells.cell[a].frame
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
-                    gradient += beyond_middle(modes, side[k], share) * cells.cell[a].frame
+                    gradient += modes * (mode_slopes(side[k], share) * cells.cell[a].frame)
                     checkerboard += modes * sign[k]
-        return value / found, gradient / found, checkerboard / found, frame / found
+        part = real(1.0) / found
+        return part * value, part * gradient, part * checkerboard, part * frame
 
     return CellTypes(Cell, Cells, describe, gather)
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.precision import Precision
 from ..scene.dimension import Continuum
@@ -111,7 +112,7 @@ def _put(array: wp.array, values) -> None:
 def _tick_kernel(continuum: Continuum, precision: Precision):
     vector, real = precision.vec(continuum.dim), precision.real
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def tick(
         first: int,
         forces: wp.array2d(dtype=vector),

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
@@ -143,7 +144,7 @@ def apply_kernel(continuum: Continuum, precision: Precision, conditions: Conditi
     MaterialNodes = node_types(continuum, precision).MaterialNodes
     Table, apply = conditions.Table, conditions.apply
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def apply_conditions(first: int, table: Table, nodes: MaterialNodes, non_finite: wp.array(dtype=wp.int32)):
         i = first + wp.tid()
         phi = apply(i, nodes.point[i].phi, END, table)
@@ -162,7 +163,7 @@ def turn_kernel(continuum: Continuum, precision: Precision, conditions: Conditio
     MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
     Table, rotation = conditions.Table, rotation_of(continuum.dim, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def turn(
         first: int,
         nodes: MaterialNodes,

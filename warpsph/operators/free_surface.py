@@ -18,6 +18,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
@@ -214,7 +215,7 @@ def _project_kernel(continuum: Continuum, precision: Precision):
             return vector()
         return table.conditions.velocity_projector[wall] * face
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def project(pairs: PairList, candidates: Candidates, table: Table):
         c = wp.tid()
         projector = identity
@@ -242,7 +243,7 @@ def _turn_kernel(continuum: Continuum, precision: Precision):
     )
     rotation = rotation_of(continuum.dim, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def turn(
         first: int,
         nodes: MaterialNodes,

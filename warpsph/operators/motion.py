@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import determinant_of
 from ..ground.precision import Precision
@@ -119,7 +120,7 @@ def _move_kernel(continuum: Continuum, precision: Precision):
     determinant = determinant_of(dim, precision)
     identity = types.tensor(np.eye(dim))
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def move(
         first: int,
         reference_density: real,
@@ -160,7 +161,7 @@ def centre_kernel(continuum: Continuum, precision: Precision):
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
     corners = 2**continuum.dim
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def centre(first: int, nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
         a = first + wp.tid()
         x = vector()

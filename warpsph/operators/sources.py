@@ -14,6 +14,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import rotation_of
@@ -193,7 +194,7 @@ def source_kernel(
         v4 = b2 - c * (v + dt * v3)
         return v + (dt / real(6.0)) * (v1 + real(2.0) * v2 + real(2.0) * v3 + v4)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def source_half_step(
         first: int,
         material: Parameters,

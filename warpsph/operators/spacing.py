@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
@@ -49,7 +50,7 @@ def _spacing_kernel(continuum: Continuum, precision: Precision):
     types, real = node_types(continuum, precision), precision.real
     edges_of, frame_of = edges_function(continuum, precision), frame_function(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def spacing(
         first: int, nodes: types.MaterialNodes, auxiliary: types.AuxiliaryNodes, result: wp.array(dtype=real)
     ):

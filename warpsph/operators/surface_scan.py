@@ -24,6 +24,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import symmetric_inverse
 from ..ground.precision import Precision
@@ -160,7 +161,7 @@ def _gather_kernel(continuum: Continuum, precision: Precision):
     real, MaterialNodes = precision.real, node_types(continuum, precision).MaterialNodes
     Candidates = surface_types(continuum, precision).Candidates
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def gather(ratio: real, nodes: MaterialNodes, candidates: Candidates):
         c = wp.tid()
         i = candidates.node[c]
@@ -202,7 +203,7 @@ def _scan_kernel(continuum: Continuum, precision: Precision):
             return wp.abs(above) + side < reach
         return above * above + side * side < reach * reach
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def scan(pairs: PairList, points: wp.array(dtype=Point), candidates: Candidates):
         c = wp.tid()
         x, h = candidates.point[c].x, candidates.smoothing_length[c]
@@ -230,7 +231,7 @@ def _fit_kernel(continuum: Continuum, precision: Precision):
     sharp_rise = math.sin(0.5 * SMOOTH_EDGE_ANGLE) * (1.0 if continuum.dim == 2 else 2.0 / math.pi)
     identity = tensor(np.eye(continuum.dim))
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def fit(pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
         c = wp.tid()
         x, h, n = candidates.point[c].x, candidates.smoothing_length[c], candidates.scan_normal[c]

@@ -15,6 +15,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.launching import Launcher
 from ..ground.materials.law import Law
@@ -27,7 +28,7 @@ from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.shock import STRENGTH, front_pressure
-from ..operators.sweep import sweep
+from ..operators.sweep import Sweep, batch_on, sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
 from ..scene.scene import Scene
@@ -83,8 +84,9 @@ class CompatibleFluxes:
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, kernel, ratio, law)
-        self._to_nodes = _to_nodes_kernel(continuum, precision, kernel, ratio, law.Parameters, moves, conditions)
+        parts = sweep(continuum, precision, kernel, batch_on(device))
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law)
+        self._to_nodes = _to_nodes_kernel(continuum, precision, parts, ratio, law.Parameters, moves, conditions)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
     def to_auxiliary(
@@ -103,7 +105,7 @@ class CompatibleFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, ratio: float, law: Law):
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Sweep, ratio: float, law: Law):
     Parameters, relax, internal = law.Parameters, law.relax, precision.vec(max(1, len(law.history)))
     corners = 2**continuum.dim
     types, cells_types = node_types(continuum, precision), cell_types(continuum, precision)
@@ -113,11 +115,11 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
     join, velocity_gradient, vector = phi_of.join, phi_of.velocity_gradient, types.vector
     velocity, stress, tensor = phi_of.velocity, phi_of.stress, types.tensor
     elastic_rate = kinematics(continuum, precision).elastic_rate
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     metric_of = parts.cell_metric(ratio)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_auxiliary(
         first: int,
         material: Parameters,
@@ -157,7 +159,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 def _to_nodes_kernel(
     continuum: Continuum,
     precision: Precision,
-    kernel: str,
+    parts: Sweep,
     ratio: float,
     Parameters: type,
     moves: bool,
@@ -168,11 +170,11 @@ def _to_nodes_kernel(
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply, Cells, gather = conditions.Table, conditions.apply, cells_types.Cells, cells_types.gather
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_nodes(
         first: int,
         material: Parameters,

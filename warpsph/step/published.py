@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.materials.law import Law
 from ..ground.precision import Precision
@@ -13,7 +14,7 @@ from ..nodes.node_sets import node_types
 from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
-from ..operators.sweep import sweep
+from ..operators.sweep import Sweep, batch_on, sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
 from ..scene.scene import Scene
@@ -37,11 +38,12 @@ class PublishedFluxes:
     ):
         self._launcher = launcher
         continuum, numerics = scene.lattice.continuum, scene.numerics
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, numerics.kernel, law.Parameters)
+        parts = sweep(continuum, precision, numerics.kernel, batch_on(launcher.device))
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
             continuum,
             precision,
-            numerics.kernel,
+            parts,
             law.Parameters,
             numerics.velocity_scheme,
             scene.large_displacements,
@@ -63,14 +65,14 @@ class PublishedFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str, Parameters: type):
+def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Sweep, Parameters: type):
     types = node_types(continuum, precision)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_auxiliary(
         first: int,
         material: Parameters,
@@ -93,7 +95,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, kernel: str
 def _to_nodes_kernel(
     continuum: Continuum,
     precision: Precision,
-    kernel: str,
+    parts: Sweep,
     Parameters: type,
     scheme: str,
     moves: bool,
@@ -104,13 +106,13 @@ def _to_nodes_kernel(
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply = conditions.Table, conditions.apply
-    rate, parts = wave_rate(continuum, precision, Parameters), sweep(continuum, precision, kernel)
+    rate = wave_rate(continuum, precision, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
     advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
-    @wp.kernel(module="unique", enable_backward=False)
+    @forward_kernel
     def to_nodes(
         first: int,
         material: Parameters,

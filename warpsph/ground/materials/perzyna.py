@@ -37,6 +37,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
         yield_size: real
         hardening: real
         residual: real
+        mean_yield_iterations: wp.int32
 
     def fill(material: PerzynaVonMises):
         parameters = PerzynaParameters()
@@ -46,6 +47,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
         parameters.yield_size = material.yield_size
         parameters.hardening = material.hardening
         parameters.residual = material.residual_ratio * material.yield_size
+        parameters.mean_yield_iterations = MEAN_YIELD_ITERATIONS if material.hardening else 1
         return parameters
 
     @wp.func
@@ -108,7 +110,7 @@ def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
             b = modulus
         # Y moves with the flow: take its mean over the step, found by iteration (a contraction, |H| < b).
         strain = real(0.0)
-        for _sweep in range(wp.static(MEAN_YIELD_ITERATIONS)):
+        for _ in range(p.mean_yield_iterations):
             mean = real(0.5) * (Y + current_yield_size(eps + strain, p))
             strain = (over - overstress_after(over, b, mean, p, dt)) / b
         # Where softening ends on the way, the rest of the time passes at the residual size.
