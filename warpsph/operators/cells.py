@@ -7,7 +7,8 @@ Of a field f at the corners, at ξ_a = ±½ along each axis a, a cell's mean and
 alternate along two axes or three, f_S = Σ s_S f/2ᵈ with s_S = Π_{a in S} 2ξ_a: the hourglass modes (Flanagan and
 Belytschko 1981). In f = … + Σ_S f_S Π_{a in S} 2ξ_a they are its mixed derivatives, and they serve twice:
 
-- the gradient at a corner differs from that in the middle: ∂f/∂ξ_a gains 2 f_S Π_{b in S, b ≠ a} 2ξ_b;
+- the gradient at a corner differs from that in the middle: ∂f/∂ξ_a gains 2 f_S Π_{b in S, b ≠ a} 2ξ_b. The
+  velocity's is taken towards the corner, for the strain of bending; the stress's never (`corner_share`);
 - they are all of a checkerboard that can be seen: it has no mean and no gradient. f − θ mean(s_S f_S) damps it and
   keeps Σ m f. As a product of second differences along two axes it leaves alone what varies along one axis only,
   such as the kink of the stress under a free edge.
@@ -42,7 +43,7 @@ class CellTypes:
         Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
         gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes'
-            values, of ∇φ a share κ of the way to the node's corner, of Σ_S s_S f_S, and of the frames.
+            values, of ∇φ (∇v a share κ of the way to the node's corner), of Σ_S s_S f_S, and of the frames.
     """
 
     Cell: type
@@ -146,7 +147,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
 
     @wp.func
     def beyond_middle(modes: phi_modes, end: types.vector, share: real):
-        """A share of what ∂f/∂ξ_a at a corner has beyond that in the middle, for each other axis."""
+        """A share of what ∂v/∂ξ_a at a corner has beyond that in the middle, for each other axis; no stress's."""
         part = phi_gradient()
         for s in range(wp.static(number)):
             for a in range(wp.static(dim)):
@@ -155,7 +156,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                     for b in range(wp.static(dim)):
                         if wp.static(b != a and b in subsets[s]):
                             factor *= share * end[b]
-                    for row in range(wp.static(types.size)):
+                    for row in range(wp.static(dim)):
                         part[row, a] += factor * modes[row, s]
         return part
 
