@@ -365,8 +365,8 @@ def test_small_supports_swing_without_growing(kernel, ratio):
             2.0,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="from the third ring of auxiliary nodes on (√6.5 = 2.55 Δx) gradients at nodes and cells are "
-                "no longer each other's transpose at an edge: energy without end at 2 Δx",
+                reason="from the third ring of auxiliary nodes on (√6.5 = 2.55 Δx) gradients at nodes and cells "
+                "are no longer each other's transpose at an edge: energy without end at 2 Δx",
             ),
         ),
     ],

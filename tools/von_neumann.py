@@ -11,7 +11,7 @@ matrix is real. With S the symbol of a Shepard value, g that of a corrected grad
     blanc-pastor, taylor:  φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same, or ← 2 S v_aux − v
     compatible:            φ ← φ + C R(D) φ + (C²/2) R(g)² φ − θ χ φ + ¼ (1 − C²) (bulk viscosity) g g·v
 
-with D the mean over a node's cells of their gradients, v's a share κ of the way to the corner, and χ the checkerboard.
+with D the mean over a node's cells of their gradients, v's a share κ of the way to the corner, χ the checkerboard.
 Weights, shares and coefficients are the package's. The sensor of the front viscosity is not linear: here a share
 of it, from none to full, acts everywhere, in the pictures none. Phase speeds are the numerical over the exact one,
 the loss is of the amplitude in a period. tests/test_stability.py holds these matrices against the code.
