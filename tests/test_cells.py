@@ -149,7 +149,10 @@ def test_a_linear_field_on_distorted_cells_is_exact_and_has_no_modes(precision, 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_gradient_of_a_multilinear_field_is_exact_on_the_way_to_the_corner(precision, dim, share):
-    """Products of two and of three different coordinates of sheared cells: their gradient varies within a cell."""
+    """Products of two and of three different coordinates of sheared cells: their gradient varies within a cell.
+
+    The velocity's, that is; of the stress the gradient in the middle is asked for.
+    """
     rng = np.random.default_rng(2)
     lattice, F = sheared(box(dim))
     products = [s for size in range(1, dim + 1) for s in itertools.combinations(range(dim), size)]
@@ -171,7 +174,8 @@ def test_gradient_of_a_multilinear_field_is_exact_on_the_way_to_the_corner(preci
     seen = see(lattice, field(lattice.nodes), precision, gradient(middle), share)
     for i, x in enumerate(lattice.nodes):
         own = middle[(lattice.cells == i).any(axis=1)]
-        expected = gradient(own + share * (x - own)).mean(axis=0)
+        expected = gradient(own).mean(axis=0)
+        expected[:dim] = gradient(own + share * (x - own)).mean(axis=0)[:dim]
         np.testing.assert_allclose(seen.gradient[i], expected, rtol=0.0, atol=1e3 * ROUNDING[precision])
 
 

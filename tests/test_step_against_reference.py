@@ -184,7 +184,7 @@ def test_second_step_equals_slow_loops(device, precision, scheme, kernel, small_
     ],
 )
 def test_second_compatible_step_equals_slow_loops(device, precision, kernel, small_strain, sources, courant):
-    """The same for the compatible scheme. κ is 0.28 at Courant 0.9 and at its bound of ½ at 0.5."""
+    """The same for the compatible scheme. κ is 0.53 at Courant 0.9 and at its bound of 1 at 0.5."""
     scene = make_scene("compatible", kernel, small_strain, sources, courant)
     simulation = Simulation(scene, device=device, precision=precision)
     first = simulation.time_step_limit

@@ -11,7 +11,7 @@ matrix is real. With S the symbol of a Shepard value, g that of a corrected grad
     blanc-pastor, taylor:  φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same, or ← 2 S v_aux − v
     compatible:            φ ← φ + C R(D) φ + (C²/2) R(g)² φ − θ χ φ + ¼ (1 − C²) (bulk viscosity) g g·v
 
-with D the mean over a node's cells of their gradients, a share κ of the way to the corner, and χ the checkerboard.
+with D the mean over a node's cells of their gradients, v's a share κ of the way to the corner, χ the checkerboard.
 Weights, shares and coefficients are the package's. The sensor of the front viscosity is not linear: here a share
 of it, from none to full, acts everywhere, in the pictures none. Phase speeds are the numerical over the exact one,
 the loss is of the amplitude in a period. tests/test_stability.py holds these matrices against the code.
@@ -133,10 +133,12 @@ class Lattice:
             if scheme == "blanc-pastor":
                 full[:, :d] = (2.0 * value[:, None, None] * auxiliary - one)[:, :d]
             return full
-        corner, checkerboard = self.cells(k, corner_share(courant, d))
-        mean = g * np.prod(np.cos(0.5 * k), axis=1)[:, None] + corner
+        corner, checkerboard = self.cells(k, corner_share(courant, d, KERNELS[self.kernel].support * self.ratio))
+        middle = g * np.prod(np.cos(0.5 * k), axis=1)[:, None]
+        rate = self.rate(middle)
+        rate[:, d:] = self.rate(middle + corner)[:, d:]
         theta = np.where(np.arange(wave.shape[1]) < d, VELOCITY_SHARE, STRESS_SHARE) * checkerboard[:, None]
-        full = one + courant * self.rate(mean) + 0.5 * courant**2 * wave @ wave - theta[:, :, None] * one
+        full = one + courant * rate + 0.5 * courant**2 * wave @ wave - theta[:, :, None] * one
         front = viscosity * STRENGTH * max(1.0 - courant**2, 0.0) / 4.0
         full[:, :d, :d] -= front * g[:, :, None] * g[:, None, :]
         return full

@@ -207,9 +207,9 @@ def bulk_viscous_pressure(rate, own_rates, corners, rho, dt, courant):
 
 
 def corner_share(courant):
-    """κ in two dimensions: the most for which ½ C² (16 C² − 16 (1 − κ)) ≤ 0.9 of the mean share, in 0 … ½."""
+    """κ in two dimensions: the most for which ½ C² (16 C² − 16 + 8 κ) ≤ 0.9 of the mean share, in 0 … 1."""
     theta = 0.9 * (VELOCITY_SHARE + STRESS_SHARE) / 2.0
-    return float(np.clip(1.0 - courant**2 + 2.0 * theta / (16.0 * courant**2), 0.0, 0.5))
+    return float(np.clip(2.0 * (1.0 - courant**2) + 2.0 * theta / (8.0 * courant**2), 0.0, 1.0))
 
 
 def stress_change(sigma, eps, grad_v, L_smooth, dt, model):
@@ -263,7 +263,7 @@ def nodes_full_step(nodes, aux, cells, v_s, sigma_s, angle, t, dt, courant, mode
             grad += cell_grad / len(around[i])
             for a, b in ((0, 1), (1, 0)):  # ∂/∂ξ_a of checkerboard·(2ξ_1)(2ξ_2) at 2ξ_b = κ·end
                 along = 2.0 * checkerboard * kappa * ENDS[k, b]
-                grad += np.outer(along, frame[a]) / len(around[i])
+                grad[:2] += np.outer(along[:2], frame[a]) / len(around[i])
             seen += ALTERNATING[k] * checkerboard / len(around[i])
         grad += stretched_gradient(nodes["x"][i], own_frame, half[i] - phi_s[i], aux, changes, model)
         rho = nodes["rho"][i]

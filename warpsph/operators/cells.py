@@ -7,7 +7,8 @@ Of a field f at the corners, at ξ_a = ±½ along each axis a, a cell's mean and
 alternate along two axes or three, f_S = Σ s_S f/2ᵈ with s_S = Π_{a in S} 2ξ_a: the hourglass modes (Flanagan and
 Belytschko 1981). In f = … + Σ_S f_S Π_{a in S} 2ξ_a they are its mixed derivatives, and they serve twice:
 
-- the gradient at a corner differs from that in the middle: ∂f/∂ξ_a gains 2 f_S Π_{b in S, b ≠ a} 2ξ_b;
+- the gradient at a corner differs from that in the middle: ∂f/∂ξ_a gains 2 f_S Π_{b in S, b ≠ a} 2ξ_b. The
+  velocity's is taken towards the corner, for the strain of bending; the stress's never (`corner_share`);
 - they are all of a checkerboard that can be seen: it has no mean and no gradient. f − θ mean(s_S f_S) damps it and
   keeps Σ m f. As a product of second differences along two axes it leaves alone what varies along one axis only,
   such as the kink of the stress under a free edge.
@@ -42,7 +43,7 @@ class CellTypes:
         Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
         gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes'
-            values, of ∇φ a share κ of the way to the node's corner, of Σ_S s_S f_S, and of the frames.
+            values, of ∇φ (∇v a share κ of the way to the node's corner), of Σ_S s_S f_S, and of the frames.
     """
 
     Cell: type
@@ -163,6 +164,7 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
     @wp.func
     def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
         value, gradient, checkerboard, frame, found = phi(), phi_gradient(), phi(), tensor(), real(0.0)
+        beyond = tensor()  # what ∇v has beyond that in the middles
         for k in range(wp.static(corners)):
             a = cells.of_node[i, k]
             if a >= 0:
@@ -172,8 +174,10 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
                 frame += cells.cell[a].frame
                 if wp.static(number > 0):
                     modes = cells.cell[a].modes
-                    gradient += modes * (mode_slopes(side[k], share) * cells.cell[a].frame)
+                    beyond += modes[: wp.static(dim)] * (mode_slopes(side[k], share) * cells.cell[a].frame)
                     checkerboard += modes * sign[k]
+        for row in range(wp.static(dim)):
+            gradient[row] += beyond[row]
         part = real(1.0) / found
         return part * value, part * gradient, part * checkerboard, part * frame
 

@@ -3,7 +3,7 @@
 3-6.  φ_aux is the mean of the cell's corners, ∇φ there the corrected gradient. The auxiliary node hands on
       ∇φ and δφ = −(Δt/2) div f(φ_s), after flow. Only smooth strain flows: the rest, elastic, damps what is rough.
 7.    φ_node^{n+1/2} = φ_s + the mean δφ of the node's cells, with the conditions: a node keeps its own value.
-8-9.  ∇φ^{n+1/2} = the mean of the cells' gradients at the node's corner, + the corrected gradient of δφ.
+8-9.  ∇φ^{n+1/2} = the mean of the cells' gradients, ∇v towards the node's corner, + the corrected gradient of δφ.
 10.   φ_adv = φ_s − Δt div f(φ^{n+1/2}) − θ (checkerboard of φ_s).
 
 On a lattice, in space, this is a summation by parts in the norm of the elastic energy: what Σ m v·dv/dt and
@@ -31,6 +31,7 @@ from ..operators.shock import STRENGTH, front_pressure
 from ..operators.sweep import Sweep, batch_on, sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
+from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
 # θ: shares of the checkerboard taken off the velocity and the stress in a step. The velocity's costs little: with
@@ -38,27 +39,36 @@ from ..scene.scene import Scene
 VELOCITY_SHARE = 1.0
 STRESS_SHARE = 0.1
 MARGIN = 0.9
+WIDEST = 2.12  # [Δx], 3/√2, where a diagonal neighbour joins: beyond, strain rates of corners make waves grow
 
 
-def corner_share(courant: float, dim: int) -> float:
-    """κ: how far from a cell's middle to its corner its gradient is taken, 0 … ½ [-].
+def corner_share(courant: float, dim: int, reach: float) -> float:
+    """κ: how far from a cell's middle to its corner the strain rate is taken, 0 … 1 [-].
 
-    In the middle, a lattice n cells across bends with 1 − 3/n² of its stiffness, with κ = ½ with 1 − 1/n². Yet
+    In the middle, a lattice n cells across bends with 1 − 3/n² of its stiffness, with κ = 1 with 1 − 1/n². Yet
     κ takes from the damping of Lax and Wendroff, which a long compression wave along a diagonal loses first. With
     s = sin(kΔ/2) its growth in a step is s⁴ times
 
-        2D:  ½ C² (16 C² − 16 (1 − κ)) − θ,        3D:  ½ C² (36 C² + 12 − 48 (1 − κ)) − 3 θ,
+        2D:  ½ C² (16 C² − 16 + 8 κ) − θ,        3D:  ½ C² (36 C² − 36 + 24 κ) − 3 θ,
 
     θ the mean share of the checkerboard taken off. κ is the most for which it is not positive, with a margin; all
     other waves are damped then (tests/test_stability.py), for any Poisson's ratio.
+
+    The stress's gradient stays that of the middle. Were it taken towards the corner as well, nodes in equilibrium
+    would have cells that are not, δv would strain the body step by step, and what has come to rest would flow.
+
+    Args:
+        courant: C = c_p Δt/Δx.
+        dim: number of dimensions.
+        reach: radius of the kernel's support [Δx].
     """
-    if dim == 1:
+    if dim == 1 or reach > WIDEST:
         return 0.0
     if courant <= 0.0:
-        return 0.5
+        return 1.0
     theta = MARGIN * 0.5 * (VELOCITY_SHARE + STRESS_SHARE)
-    undamped = 1.0 - courant**2 if dim == 2 else 0.75 * (1.0 - courant**2)
-    return min(0.5, max(0.0, undamped + theta / (8.0 * courant**2)))
+    undamped = (2.0 if dim == 2 else 1.5) * (1.0 - courant**2)
+    return min(1.0, max(0.0, undamped + theta / (4.0 * courant**2)))
 
 
 class CompatibleFluxes:
@@ -80,7 +90,8 @@ class CompatibleFluxes:
         continuum, moves = lattice.continuum, scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
         types, device = cell_types(continuum, precision), launcher.device
-        self._launcher, self._dim = launcher, lattice.dim
+        self._launcher = launcher
+        self._dim, self._reach = lattice.dim, KERNELS[kernel].support * ratio
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
@@ -99,7 +110,7 @@ class CompatibleFluxes:
 
     def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        share = corner_share(courant, self._dim)
+        share = corner_share(courant, self._dim, self._reach)
         inputs = [material, conditions, dt, share, pairs, auxiliary, self._cells, nodes]
         self._launcher.launch(self._to_nodes, nodes.point, inputs)
 
