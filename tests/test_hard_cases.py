@@ -9,9 +9,12 @@ from warpsph import (
     Box,
     Elastic,
     Fixed,
+    Free,
     FreeSurface,
+    Numerics,
     PerzynaVonMises,
     PrescribedVelocity,
+    Ramp,
     Roller,
     Rotating,
     Scene,
@@ -350,33 +353,48 @@ def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surfac
 @pytest.mark.parametrize(
     ("kernel", "ratio"), [("gaussian", 0.53), ("cubic_spline", 0.8), ("wendland_c2", 0.8), ("gaussian", 0.85)]
 )
-def test_small_supports_swing_without_growing(kernel, ratio):
-    """The smallest supports allowed, and the largest that keep the summation by parts (2.55 Δx: the next ring)."""
+def test_smallest_and_largest_supports_swing_without_growing(kernel, ratio):
+    """The smallest supports allowed, and the largest (2.55 Δx): beyond, edges know no summation by parts."""
     _, energies = run_with_energy(hanging_bar(10, 10, kernel=kernel, smoothing_ratio=ratio), every=3)
     assert energies.total.max() <= 0.05 * max(energies.elastic)
     assert return_error(standing_mode("S", 20, kernel=kernel, smoothing_ratio=ratio)) <= 0.03
 
 
 @pytest.mark.parametrize(
-    "ratio",
+    "scheme",
     [
-        1.2,
+        "blanc-pastor",
         pytest.param(
-            2.0,
+            "compatible",
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="from the third ring of auxiliary nodes on (√6.5 = 2.55 Δx) gradients at nodes and cells "
-                "are no longer each other's transpose at an edge: energy without end at 2 Δx",
+                reason="the damping of the stress's checkerboard is one-sided at the foot, and bleeds what holds "
+                "the body there: docs/velocity_steps.md, 'What still fails'",
             ),
         ),
     ],
 )
-def test_large_supports_swing_without_growing(ratio):
-    """Up to 6 Δx are allowed."""
-    simulation = Simulation(hanging_bar(10, 10, smoothing_ratio=ratio), device="cpu")
-    energies = Energies(simulation, every=3)
-    simulation.run(observers=[energies])
-    assert energies.total.max() <= 0.05 * max(energies.elastic)
+def test_column_that_yields_at_its_foot_comes_to_rest(scheme):
+    """On a smooth base, whose lowest fifth is loaded beyond Y: the soil above holds it together, as it has to.
+
+    Without an equilibrium the mean load on any inclined plane would exceed Y; it is at most 0.75 of it.
+    """
+    soil = {"young_modulus": 8e6, "poisson_ratio": 0.3, "density": 2000.0}
+    weight, height = 2000.0 * 9.81, 2.0
+    scene = Scene(
+        shape=Box((1.0, height), 0.125),
+        material=PerzynaVonMises(**soil, fluidity=1.0, yield_size=0.765 * weight * height),
+        conditions=[Roller(edge("bottom")), Roller(edge("left")), Free(edge("right")), Free(edge("top"))],
+        body_force=BodyForce((0.0, -9.81), Ramp(1.0)),
+        damping=5.0,
+        duration=8.0,
+        numerics=Numerics(velocity_scheme=scheme),
+    )
+    simulation = Simulation(scene, device="cpu")
+    simulation.run(until=4.0)
+    strain = simulation.field("equivalent_plastic_strain")
+    simulation.run()
+    assert (simulation.field("equivalent_plastic_strain") - strain).max() <= 0.05 * strain.max()
 
 
 def soft_cut(spacing):

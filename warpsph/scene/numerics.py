@@ -33,6 +33,9 @@ SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
 LARGEST_SUPPORT = 6.0
+# With `compatible`, but in a bar: from the third ring of auxiliary nodes on (√6.5 Δx) gradients at nodes and cells
+# are no longer each other's transpose at an edge, and waves there grow.
+LARGEST_COMPATIBLE_SUPPORT = 2.55
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +45,8 @@ class Numerics:
     Args:
         kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
         smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given. With
-            `compatible` keep the support below 2.12 Δx: see docs/velocity_steps.md, "What still fails".
+            `compatible` keep the support below 2.12 Δx, and it must be at most 2.55 Δx: see
+            docs/velocity_steps.md, "What still fails".
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
         velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the
             published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
@@ -91,11 +95,13 @@ class Numerics:
         """
         support = KERNELS[self.kernel].support
         least = continuum.smallest_support * stretch / support
-        most = LARGEST_SUPPORT / support
+        compatible = self.velocity_scheme == "compatible" and continuum.dim > 1
+        most = (LARGEST_COMPATIBLE_SUPPORT if compatible else LARGEST_SUPPORT) / support
         if not least < self.smoothing_ratio <= most:
+            reach = continuum.smallest_support * stretch
             raise SceneError(
                 "smoothing_ratio",
                 self.smoothing_ratio,
-                f"with kernel {self.kernel} in {continuum.dim}D it must be above {least:.4g} (the support must "
-                f"reach {continuum.smallest_support * stretch:.3g} spacings) and at most {most:.3g}",
+                f"with kernel {self.kernel} and scheme {self.velocity_scheme} in {continuum.dim}D it must be "
+                f"above {least:.4g} (the support must reach {reach:.3g} spacings) and at most {most:.4g}",
             )
