@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from warpsph import (
+    PUBLISHED,
     Box,
     Check,
     Disc,
@@ -31,7 +32,7 @@ AMPLITUDE = 0.1  # of the wave [m]; its length is 1 m
 ELLIPSE = (1.3, 1.0 / 1.3)  # semi-axes [m]
 BODIES = ("wave", "disc", "ellipse", "staircase")
 
-NUMERICS = {"smoothing_ratio": 1.2}  # mapped cells are stretched
+NUMERICS = PUBLISHED | {"smoothing_ratio": 1.2}  # round kernels on cells that are stretched
 PARAMETERS = (
     Parameter("body", "wave", "-", f"one of {', '.join(BODIES)}", BODIES),
     Parameter("spacing", 0.05, "m", "distance between neighbouring nodes: 20 a wavelength"),
