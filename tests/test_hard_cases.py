@@ -23,7 +23,8 @@ from warpsph import (
     region,
 )
 from warpsph.cli.catalogue import load
-from warpsph.step.compatible import STRESS_SHARE, VELOCITY_SHARE
+from warpsph.operators.damping import STRESS_SHARE
+from warpsph.step.compatible import VELOCITY_SHARE
 
 from .motions import SOFT, Energies, hanging_bar, return_error, standing_mode
 
@@ -360,20 +361,7 @@ def test_smallest_and_largest_supports_swing_without_growing(kernel, ratio):
     assert return_error(standing_mode("S", 20, kernel=kernel, smoothing_ratio=ratio)) <= 0.03
 
 
-@pytest.mark.parametrize(
-    "scheme",
-    [
-        "blanc-pastor",
-        pytest.param(
-            "compatible",
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="the damping of the stress's checkerboard is one-sided at the foot, and bleeds what holds "
-                "the body there: docs/velocity_steps.md, 'What still fails'",
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("scheme", ["blanc-pastor", "compatible"])
 def test_column_that_yields_at_its_foot_comes_to_rest(scheme):
     """On a smooth base, whose lowest fifth is loaded beyond Y: the soil above holds it together, as it has to.
 

@@ -31,11 +31,12 @@ from matplotlib.figure import Figure
 from warpsph.errors import WarpSPHError
 from warpsph.ground.precision import PRECISIONS
 from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
+from warpsph.operators.damping import STRESS_SHARE
 from warpsph.operators.shock import STRENGTH
 from warpsph.operators.sweep import EDGE
 from warpsph.scene.dimension import CONTINUA
 from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
-from warpsph.step.compatible import STRESS_SHARE, VELOCITY_SHARE, corner_share
+from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
 COURANT = (0.3, 0.5, 0.8, 0.95)
 STABLE = 1.0 + 1e-9

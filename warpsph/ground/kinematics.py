@@ -26,6 +26,7 @@ class Kinematics:
         relaxation: (σ, q, G, E) → Dₑ : ∂q/∂σ = 3 G s/q; E σ/q in a bar.
         spherical: p → p 1 as stored, σ33 of plane strain included; p in a bar.
         transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
+        norm: σ → √(σ : σ).
     """
 
     elastic_rate: wp.Function
@@ -35,6 +36,7 @@ class Kinematics:
     relaxation: wp.Function
     spherical: wp.Function
     transform: wp.Function
+    norm: wp.Function
 
 
 @cache
@@ -76,7 +78,11 @@ def _bar(precision: Precision) -> Kinematics:
     def transform(sigma: stress, P: matrix):
         return P[0, 0] * sigma * P[0, 0]
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
+    @wp.func
+    def norm(sigma: stress):
+        return wp.abs(sigma[0])
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
 def _plane_strain(precision: Precision) -> Kinematics:
@@ -127,7 +133,11 @@ def _plane_strain(precision: Precision) -> Kinematics:
         s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * wp.transpose(P)
         return stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
+    @wp.func
+    def norm(sigma: stress):
+        return wp.sqrt(wp.dot(sigma, sigma) + sigma[2] * sigma[2])
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
 def _solid(precision: Precision) -> Kinematics:
@@ -184,7 +194,12 @@ def _solid(precision: Precision) -> Kinematics:
     def transform(sigma: stress, P: matrix):
         return stored(P * tensor(sigma) * wp.transpose(P))
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform)
+    @wp.func
+    def norm(sigma: stress):
+        shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
+        return wp.sqrt(wp.dot(sigma, sigma) + shear2)
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
 _KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {

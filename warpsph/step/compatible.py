@@ -26,6 +26,7 @@ from ..nodes.node_sets import node_types
 from ..operators.cells import cell_types, cells_of_nodes
 from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
+from ..operators.damping import taken_off
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.shock import STRENGTH, front_pressure
 from ..operators.sweep import Sweep, batch_on, sweep
@@ -34,10 +35,9 @@ from ..scene.dimension import Continuum
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
-# θ: shares of the checkerboard taken off the velocity and the stress in a step. The velocity's costs little: with
-# 20 cells a half wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave. The stress's strengthens a shear band one cell wide.
+# θ of the velocity: the share of its checkerboard taken off in a step. It costs little: with 20 cells a half
+# wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave.
 VELOCITY_SHARE = 1.0
-STRESS_SHARE = 0.1
 MARGIN = 0.9
 WIDEST = 2.12  # [Δx], 3/√2, where a diagonal neighbour joins: beyond, strain rates of corners make waves grow
 
@@ -51,7 +51,8 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
 
         2D:  ½ C² (16 C² − 16 + 8 κ) − θ,        3D:  ½ C² (36 C² − 36 + 24 κ) − 3 θ,
 
-    θ the mean share of the checkerboard taken off. κ is the most for which it is not positive, with a margin; all
+    θ the mean share of the checkerboard taken off, of the velocity's alone, since the stress's is bounded
+    (`warpsph.operators.damping`). κ is the most for which it is not positive, with a margin; all
     other waves are damped then (tests/test_stability.py), for any Poisson's ratio.
 
     The stress's gradient stays that of the middle. Were it taken towards the corner as well, nodes in equilibrium
@@ -66,7 +67,7 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
         return 0.0
     if courant <= 0.0:
         return 1.0
-    theta = MARGIN * 0.5 * (VELOCITY_SHARE + STRESS_SHARE)
+    theta = MARGIN * 0.5 * VELOCITY_SHARE
     undamped = (2.0 if dim == 2 else 1.5) * (1.0 - courant**2)
     return min(1.0, max(0.0, undamped + theta / (4.0 * courant**2)))
 
@@ -181,7 +182,7 @@ def _to_nodes_kernel(
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply, Cells, gather = conditions.Table, conditions.apply, cells_types.Cells, cells_types.gather
-    rate = wave_rate(continuum, precision, Parameters)
+    rate, taken_off_stress = wave_rate(continuum, precision, Parameters), taken_off(continuum, precision)
     collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
 
@@ -209,8 +210,8 @@ def _to_nodes_kernel(
 
         phi_adv = point.phi + dt * minus_div_f  # 10
         v_adv = velocity(phi_adv) - real(VELOCITY_SHARE) * velocity(checkerboard)
-        sigma_adv = stress(phi_adv) - real(STRESS_SHARE) * stress(checkerboard)
-        nodes.point[i].phi = join(v_adv, sigma_adv)
+        lost = taken_off_stress(stress(checkerboard), nodes.velocity_gradient[i], material.shear, dt)
+        nodes.point[i].phi = join(v_adv, stress(phi_adv) - lost)
         nodes.half_velocity[i] = velocity(phi_half)
         nodes.velocity_gradient[i] = velocity_gradient(grad)
 
