@@ -35,6 +35,7 @@ TRAFFIC = {
             "nodes.point",
             "nodes.smoothing_length",
             "nodes.density",
+            "nodes.velocity_gradient",
             "conditions.table.row",
         ),
         ("nodes.point", "nodes.half_velocity", "nodes.velocity_gradient"),

@@ -2,9 +2,9 @@
 
 A static load is held by stresses that are not free of checkerboards, at edges and where the soil yields. Bled off
 every step, they would be made up for by a strain rate d with Dₑ : d Δt = what is taken off: the body would flow.
-With no more taken off than β 2G |L| Δt, β < 1, there is no such d but 0, since |Dₑ : d| ≥ 2G |d| (ν ≥ 0); but for a
-body that spins as it flows, |d| < β |L|. What has come to rest stays. Whatever moves is damped as if there were no
-bound: in a wave on 20 cells, which loses 4·10⁻⁶ of its stress a step, that is 3000 times as much.
+With no more taken off than β 2G |L| Δt, β < 1, there is no such d but 0, since |Dₑ : d| ≥ 2G |d| (ν ≥ 0); but for
+a body that spins as it flows, |d| < β |L|. What has come to rest stays. Whatever moves is damped as if there were
+no bound: in a wave on 20 cells, which loses 4·10⁻⁶ of its stress a step, that is 3000 times as much.
 """
 
 from functools import cache
