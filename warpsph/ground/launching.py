@@ -145,6 +145,7 @@ class _Lockstep:
 
     def run(self) -> None:
         """Replay while the flag is not zero."""
+        self._barrier.reset()  # a run before this one may have failed
         self._together(self._replay)
 
     def _replay(self, thread: int) -> None:
