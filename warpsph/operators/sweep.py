@@ -29,8 +29,8 @@ class Sweep:
 
     Attributes:
         collect: (target index, its x and metric M, base value, pair list, source points) → Sums. ξ² = |M r|²:
-            M = 1/h for
-            a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes MᵀM out of ∇W again.
+            M = 1/h for a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes MᵀM out of ∇W
+            again.
         value: Sums → Shepard value; the base value where no neighbour is left.
         round_metric: h → 1/h.
         cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in

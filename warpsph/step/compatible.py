@@ -4,11 +4,12 @@
       ∇φ and δφ = −(Δt/2) div f(φ_s), after flow. Only smooth strain flows: the rest, elastic, damps what is rough.
 7.    φ_node^{n+1/2} = φ_s + the mean δφ of the node's cells, with the conditions: a node keeps its own value.
 8-9.  ∇φ^{n+1/2} = the mean of the cells' gradients, ∇v towards the node's corner, + the corrected gradient of δφ.
-10.   φ_adv = φ_s − Δt div f(φ^{n+1/2}) − θ (checkerboard of φ_s).
+10.   φ_adv = φ_s − Δt div f(φ^{n+1/2}) − θ (checkerboard of φ_s), the stress's part bounded.
 
-On a lattice, in space, this is a summation by parts in the norm of the elastic energy: what Σ m v·dv/dt and
-Σ V σ:Dₑ⁻¹:dσ/dt gain together is what the edges let through, to rounding. Tractions must vanish orthogonally in
-that norm, by elastic unloading. Kernels are stretched and turned with the cells, so that this survives strain.
+On a lattice, in space, with ∇v of the middle as well, this is a summation by parts in the norm of the elastic
+energy: what Σ m v·dv/dt and Σ V σ:Dₑ⁻¹:dσ/dt gain together is what the edges let through, to rounding. With ∇v
+towards the corner the energy that does not grow is that of the cells' mean stresses. Tractions must vanish
+orthogonally, by elastic unloading. Kernels are stretched and turned with the cells, so that this survives strain.
 """
 
 from functools import cache
@@ -32,7 +33,6 @@ from ..operators.shock import STRENGTH, front_pressure
 from ..operators.sweep import Sweep, batch_on, sweep
 from ..operators.waves import wave_rate
 from ..scene.dimension import Continuum
-from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
 # θ of the velocity: the share of its checkerboard taken off in a step. It costs little: with 20 cells a half
@@ -52,8 +52,8 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
         2D:  ½ C² (16 C² − 16 + 8 κ) − θ,        3D:  ½ C² (36 C² − 36 + 24 κ) − 3 θ,
 
     θ the mean share of the checkerboard taken off, of the velocity's alone, since the stress's is bounded
-    (`warpsph.operators.damping`). κ is the most for which it is not positive, with a margin; all
-    other waves are damped then (tests/test_stability.py), for any Poisson's ratio.
+    (`warpsph.operators.damping`). κ is the most for which it is not positive, with a margin; all other waves are
+    damped then (tests/test_stability.py), for any Poisson's ratio.
 
     The stress's gradient stays that of the middle. Were it taken towards the corner as well, nodes in equilibrium
     would have cells that are not, δv would strain the body step by step, and what has come to rest would flow.
@@ -92,7 +92,7 @@ class CompatibleFluxes:
         ratio = scene.numerics.smoothing_ratio
         types, device = cell_types(continuum, precision), launcher.device
         self._launcher = launcher
-        self._dim, self._reach = lattice.dim, KERNELS[kernel].support * ratio
+        self._dim, self._reach = lattice.dim, scene.numerics.support
         self._cells = types.Cells()
         self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
         self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
