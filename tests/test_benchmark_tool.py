@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpsph import Simulation
+
 TOOLS = Path(__file__).parent.parent / "tools"
 sys.path.insert(0, str(TOOLS))
 from benchmarking import counting, timing  # noqa: E402
-from benchmarking.building import build  # noqa: E402
 from benchmarking.scenes import Case, scene  # noqa: E402
 from benchmarking.tables import compare  # noqa: E402
 
@@ -97,7 +98,7 @@ def test_a_solver_that_is_not_installed_is_skipped(tmp_path):
 
 def small(dimension, material="viscoplastic"):
     case = Case(dimension, material, "float64", "cpu", 1, 5**dimension)
-    return build(scene(case), case.device, case.precision, case.threads)
+    return Simulation(scene(case), case.device, case.precision, case.threads)
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])

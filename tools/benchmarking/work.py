@@ -5,11 +5,11 @@ import time
 
 import warp as wp
 
+from warpsph import Simulation
 from warpsph.errors import WarpSPHError
 from warpsph.simulation.device import start_warp
 
 from . import counting, machine, timing
-from .building import build
 from .scenes import Case, scene
 
 
@@ -29,7 +29,7 @@ def time_case(case: dict, seconds: float) -> dict:
     case = Case(**case)
     empty = counting.peak_host_memory()
     begin = time.perf_counter()
-    simulation = build(scene(case), case.device, case.precision, case.threads)
+    simulation = Simulation(scene(case), case.device, case.precision, case.threads)
     ready = time.perf_counter() - begin
     n = len(simulation.lattice.nodes)
     result = {"lattice_nodes": n, **timing.time_steps(simulation, seconds), "build_seconds": ready}
@@ -53,7 +53,7 @@ def start_up(case: dict) -> dict:
     """Seconds to a first step, without imports; the kernel cache is whatever the environment says."""
     case = Case(**case)
     begin = time.perf_counter()
-    simulation = build(scene(case), case.device, case.precision, case.threads)
+    simulation = Simulation(scene(case), case.device, case.precision, case.threads)
     built = time.perf_counter()
     simulation.step()
     wp.synchronize_device(simulation.device)
