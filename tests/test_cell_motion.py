@@ -187,7 +187,7 @@ def test_spacing_is_the_least_singular_value_of_the_edges_times_the_root_of_the_
     """Of every cell of a distorted lattice; the power method may be 0.3 % above, and never below."""
     simulation = simulation_of(dim, "cpu", precision)
     shrinkage_after(simulation, MOTIONS[name](dim))
-    spacing = simulation._stepper._motion._spacing._spacing.numpy()
+    spacing = 1.0 / simulation._stepper._motion._spacing._rate.numpy()
     edges = edges_of(simulation)
     density = SOFT.density * simulation.lattice.cell_volumes() / np.abs(np.linalg.det(edges))
     error = spacing / (np.linalg.svd(edges, compute_uv=False).min(axis=1) * np.sqrt(density)) - 1.0

@@ -12,7 +12,8 @@ import numpy as np
 import warp as wp
 
 from ..ground.compiling import forward_kernel
-from ..ground.precision import Precision
+from ..ground.precision import PRECISIONS, Precision
+from ..ground.reduction import LargestMagnitude
 from ..scene.dimension import Continuum
 from .node_sets import node_types
 
@@ -50,13 +51,18 @@ class Neighbours:
         self._launcher, self._targets, self._sources = launcher, targets, sources
         self._support, self._skin, self._spacing = support, skin, spacing
         self._kernels = _list_kernels(continuum, precision)
-        self.kernels = (self._kernels.copy_points, self._kernels.count, self._kernels.fill)
-        device = sources.point.device
+        device, n, m = sources.point.device, targets.point.shape[0], sources.point.shape[0]
         self._origin = np.array(sources.point.numpy()["x"].mean(axis=0), dtype=float)
-        self._grid_points = wp.zeros(sources.point.shape[0], dtype=wp.vec3, device=device)
+        self._grid_points = wp.zeros(m, dtype=wp.vec3, device=device)
         self._grid = wp.HashGrid(*_grid_size(sources, spacing, continuum.dim), device=device)
-        self._counts = wp.zeros(targets.point.shape[0] + 1, dtype=wp.int32, device=device)
-        self.pairs.start = wp.zeros(targets.point.shape[0] + 1, dtype=wp.int32, device=device)
+        self._counts = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self.pairs.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._extent = LargestMagnitude(3 * m, PRECISIONS["float32"], launcher)
+        self._largest_h = LargestMagnitude(n, precision, launcher)
+        self.kernels = (
+            *(self._kernels.copy_points, self._kernels.count, self._kernels.fill),
+            *(*self._extent.kernels, *self._largest_h.kernels),
+        )
 
     def build(self) -> None:
         """Make the list anew for the present positions and smoothing lengths."""
@@ -66,9 +72,8 @@ class Neighbours:
         copied = [self._sources.point, origin, self._grid_points]
         self._launcher.launch(kernels.copy_points, self._grid_points, copied)
         # The grid works in float32: widen its queries by what rounding can do, the sweep tests exactly.
-        extent = float(np.abs(self._grid_points.numpy()).max())
-        margin = self._skin + 1e-4 * self._spacing + 1e-6 * extent
-        radius = self._support * float(self._targets.smoothing_length.numpy().max()) + margin
+        margin = self._skin + 1e-4 * self._spacing + 1e-6 * self._extent.of(self._grid_points)
+        radius = self._support * self._largest_h.of(self._targets.smoothing_length) + margin
         self._grid.build(self._grid_points, radius)
         query = [self._grid.id, self._grid_points, self._targets.point, self._targets.smoothing_length]
         query += [origin, self._support, margin]

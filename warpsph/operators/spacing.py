@@ -8,12 +8,12 @@ The stiffness stays what it is while the density falls where a body is stretched
 
 from functools import cache
 
-import numpy as np
 import warp as wp
 
 from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.precision import Precision
+from ..ground.reduction import LargestMagnitude
 from ..nodes.node_sets import node_types
 from ..scene.dimension import Continuum
 from .cells import edges_function, frame_function
@@ -24,7 +24,7 @@ DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that di
 
 
 class Spacing:
-    """Measures the spacing of the cells, over the wave speed there.
+    """Measures the rate of the fastest wave across each cell, its speed over the cell's spacing.
 
     Args:
         m: number of cells.
@@ -32,17 +32,18 @@ class Spacing:
 
     def __init__(self, m: int, continuum: Continuum, precision: Precision, launcher: Launcher):
         self._launcher, self._kernel = launcher, _spacing_kernel(continuum, precision)
-        self._spacing = wp.zeros(m, dtype=precision.real, device=launcher.device)
+        self._rate = wp.zeros(m, dtype=precision.real, device=launcher.device)
+        self._largest = LargestMagnitude(m, precision, launcher)
         self._initial: float | None = None
-        self.kernels = (self._kernel,)
+        self.kernels = (self._kernel, *self._largest.kernels)
 
     def shrinkage(self, nodes, auxiliary) -> float:
         """The least time of a wave from node to node over the one at the first call, between `SMALLEST` and 1."""
-        self._launcher.launch(self._kernel, self._spacing, [nodes, auxiliary, self._spacing])
-        smallest = float(np.min(self._spacing.numpy()))
+        self._launcher.launch(self._kernel, self._rate, [nodes, auxiliary, self._rate])
+        fastest = self._largest.of(self._rate)
         if self._initial is None:
-            self._initial = smallest
-        return float(np.clip(smallest / self._initial, SMALLEST, 1.0))
+            self._initial = fastest
+        return max(SMALLEST, self._initial / max(fastest, self._initial))
 
 
 @cache
@@ -58,12 +59,12 @@ def _spacing_kernel(continuum: Continuum, precision: Precision):
         frame = frame_of(edges_of(a, auxiliary, nodes.point))
         stiff = frame * wp.transpose(frame)
         if wp.trace(stiff) <= real(0.0):
-            result[a] = real(wp.inf)  # a folded cell: its kernels are round
+            result[a] = real(0.0)  # a folded cell: its kernels are round
             return
         power = stiff / wp.trace(stiff)
         for _ in range(DOUBLINGS):
             power = power * power
             power = power / wp.trace(power)
-        result[a] = wp.sqrt(auxiliary.density[a] / wp.trace(stiff * power))
+        result[a] = wp.sqrt(wp.trace(stiff * power) / auxiliary.density[a])
 
     return spacing
