@@ -65,9 +65,9 @@ def test_densities_are_exact_in_a_homogeneous_motion(device, precision, dim, nam
     np.testing.assert_allclose(simulation.field("position"), simulation.lattice.nodes @ F.T, atol=tolerance)
     np.testing.assert_allclose(simulation.field("density"), SOFT.density / ratio, rtol=tolerance)
     np.testing.assert_allclose(simulation.auxiliary.density.numpy(), SOFT.density / ratio, rtol=tolerance)
-    volume = simulation.auxiliary.point.numpy()["volume"]
+    volume = simulation.auxiliary.volume.numpy()
     np.testing.assert_allclose(volume, simulation.lattice.cell_volumes() * ratio, rtol=tolerance)
-    held = simulation.nodes.point.numpy()["volume"] * simulation.field("density")
+    held = simulation.nodes.volume.numpy() * simulation.field("density")
     np.testing.assert_allclose(held, weight, rtol=tolerance)
     np.testing.assert_array_equal(simulation.field("mass"), mass)
 

@@ -11,7 +11,7 @@ import warp as wp
 from warpsph import Box
 from warpsph.ground.precision import PRECISIONS
 from warpsph.nodes.node_sets import node_types
-from warpsph.operators.cells import cell_types, cells_of_nodes
+from warpsph.operators.cells import cell_types
 from warpsph.operators.shock import ROUGH, front_pressure
 from warpsph.operators.sweep import sweep
 from warpsph.scene import CONTINUA
@@ -60,7 +60,7 @@ def probes(dim, precision):
     """Kernels that run `describe` on all cells and `gather` on all nodes."""
     continuum, real = CONTINUA[dim], PRECISIONS[precision]
     types, cell_of = node_types(continuum, real), cell_types(continuum, real)
-    describe, gather, Cells = cell_of.describe, cell_of.gather, cell_of.Cells
+    describe, write, gather, Cells = cell_of.describe, cell_of.write, cell_of.gather, cell_of.Cells
     phi, phi_gradient, Point, AuxiliaryNodes = types.phi, types.phi_gradient, types.Point, types.AuxiliaryNodes
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -74,7 +74,7 @@ def probes(dim, precision):
         mean, cell = describe(a, auxiliary, nodes)
         cell.gradient = gradients[a]
         auxiliary.point[a].phi = mean
-        cells.cell[a] = cell
+        write(a, cell, cells)
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather_all(
@@ -103,11 +103,9 @@ def see(lattice, field, precision, middle_gradient=None, share=1.0):
     n, m = len(lattice.nodes), len(lattice.cells)
     points = np.zeros(n, dtype=Point.numpy_dtype())
     points["x"], points["phi"] = lattice.nodes, field
-    auxiliary, cells = types.AuxiliaryNodes(), cell_of.Cells()
+    auxiliary, cells = types.AuxiliaryNodes(), cell_of.new(lattice, "cpu")
     auxiliary.point = wp.zeros(m, dtype=Point, device="cpu")
     auxiliary.cell = wp.array(lattice.cells, dtype=wp.int32, device="cpu")
-    cells.cell = wp.zeros(m, dtype=cell_of.Cell, device="cpu")
-    cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device="cpu")
     if middle_gradient is None:
         middle_gradient = np.zeros((m, types.size, lattice.dim))
     gradients = wp.array(middle_gradient, dtype=phi_gradient, device="cpu")
@@ -117,7 +115,8 @@ def see(lattice, field, precision, middle_gradient=None, share=1.0):
     written = (phi, phi_gradient, phi, types.tensor)
     outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
     wp.launch(gather_all, n, [auxiliary, cells, share], outputs, device="cpu")
-    modes = cells.cell.numpy()["modes"].reshape(m, types.size, -1)
+    gradient, frame = types.size * lattice.dim, lattice.dim**2
+    modes = cells.numbers.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
 
 

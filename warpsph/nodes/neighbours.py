@@ -4,6 +4,10 @@ A list holds for each target point the source points within its search radius, i
 no point has used up half the skin the list contains every neighbour, and the sweep drops the few that lie
 outside the support. Building costs about six sweeps (measured: 48 ms against 7.4 ms at 10⁵ points), so a list
 pays off after a few steps; nodes move about 10⁻³ Δx a step.
+
+Neighbours are listed in the order of their indices, whatever that of the grid's cells: so sums do not depend on
+the grid, and consecutive targets, whose n-th neighbours are then consecutive too, read from the same cache lines:
+on a GPU half as many as in the grid's order.
 """
 
 from functools import cache
@@ -24,7 +28,7 @@ shell of an undeformed lattice (2.12), so the skin costs no extra pair there."""
 
 @wp.struct
 class PairList:
-    """Neighbours of target t: index[start[t]] … index[start[t + 1] − 1]."""
+    """Neighbours of target t: index[start[t]] < … < index[start[t + 1] − 1]."""
 
     start: wp.array(dtype=wp.int32)
     index: wp.array(dtype=wp.int32)
@@ -156,10 +160,15 @@ def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
         i = first + wp.tid()
         p = grid_point(targets[i].x, origin)
         radius = support * wp.float32(smoothing_length[i]) + margin
-        k = pairs.start[i]
+        start = pairs.start[i]
+        end = int(start)
         for j in wp.hash_grid_query(grid, p, radius):
             if wp.length_sq(grid_points[j] - p) < radius * radius:
+                k = int(end)
+                while k > start and pairs.index[k - 1] > j:
+                    pairs.index[k] = pairs.index[k - 1]
+                    k -= 1
                 pairs.index[k] = j
-                k += 1
+                end += 1
 
     return _Kernels(vector, copy_points, count, fill)

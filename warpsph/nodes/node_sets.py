@@ -21,8 +21,9 @@ class NodeTypes:
         vector, stress, phi: Warp vectors of length d, s and d + s.
         tensor: d × d matrix.
         phi_gradient: (d + s) × d matrix, ∂φ_k/∂x_l.
-        Point: what a neighbour is asked for, packed since one gather is cheaper than three: position x [m],
-            interpolation volume V [mᵈ], unknowns φ = (v [m/s], σ [Pa]).
+        Point: what a neighbour is asked for, packed since one gather is cheaper than two: position x [m] and
+            unknowns φ = (v [m/s], σ [Pa]). 8 values in the plane and 12 in space suit wide loads; with the volume
+            in it they would not.
         MaterialNodes, AuxiliaryNodes: structs of arrays, see `material_nodes` and `auxiliary_nodes`.
     """
 
@@ -46,12 +47,12 @@ def node_types(continuum: Continuum, precision: Precision) -> NodeTypes:
     @wp.struct
     class Point:
         x: vector
-        volume: real
         phi: precision.vec(d + s)
 
     @wp.struct
     class MaterialNodes:
         point: wp.array(dtype=Point)
+        volume: wp.array(dtype=real)
         reference: wp.array(dtype=vector)
         displacement: wp.array(dtype=vector)
         density: wp.array(dtype=real)
@@ -63,6 +64,7 @@ def node_types(continuum: Continuum, precision: Precision) -> NodeTypes:
     @wp.struct
     class AuxiliaryNodes:
         point: wp.array(dtype=Point)
+        volume: wp.array(dtype=real)
         density: wp.array(dtype=real)
         smoothing_length: wp.array(dtype=real)
         cell: wp.array2d(dtype=wp.int32)
@@ -83,16 +85,17 @@ def node_types(continuum: Continuum, precision: Precision) -> NodeTypes:
 def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device: wp.Device):
     """The material nodes of a scene in its initial state, as a `MaterialNodes` struct.
 
-    Its arrays, one entry a node: `point`; `reference`, the initial position X [m]; `displacement` u [m], the
-    unknown that is integrated, since in float32 Δt·v is often below the last bit of x; `density` ρ [kg/mᵈ];
-    `smoothing_length` h [m]; `weight` ρ₀V₀ [kg], so that V = ρ₀V₀/ρ; `half_velocity` v^{n+1/2} [m/s];
-    `velocity_gradient` L [1/s] of v^{n+1/2}, which turns the stresses in the source steps.
+    Its arrays, one entry a node: `point`; `volume` V [mᵈ] in sums over neighbours; `reference`, the initial
+    position X [m]; `displacement` u [m], the unknown that is integrated, since in float32 Δt·v is often below the
+    last bit of x; `density` ρ [kg/mᵈ]; `smoothing_length` h [m]; `weight` ρ₀V₀ [kg], so that V = ρ₀V₀/ρ;
+    `half_velocity` v^{n+1/2} [m/s]; `velocity_gradient` L [1/s] of v^{n+1/2}, which turns the stresses in the
+    source steps.
     """
     lattice, density = scene.lattice, scene.material.density
     n = len(lattice.nodes)
     _, volume = lattice.node_volumes()
     point = np.zeros(n, dtype=types.Point.numpy_dtype())
-    point["x"], point["volume"] = lattice.nodes, volume
+    point["x"] = lattice.nodes
     point["phi"] = np.concatenate([scene.initial_velocity, scene.initial_stress], axis=1)
     nodes = types.MaterialNodes()
 
@@ -100,6 +103,7 @@ def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device:
         return wp.array(values, dtype=dtype, device=device)
 
     nodes.point = array(point, types.Point)
+    nodes.volume = array(volume, precision.real)
     nodes.reference = array(lattice.nodes, types.vector)
     nodes.displacement = wp.zeros(n, dtype=types.vector, device=device)
     nodes.density = array(np.full(n, density), precision.real)
@@ -134,12 +138,13 @@ def material_history(n: int, law: Law, precision: Precision, device: wp.Device) 
 def auxiliary_nodes(scene: Scene, types: NodeTypes, precision: Precision, device: wp.Device):
     """The auxiliary nodes, as an `AuxiliaryNodes` struct, still to be centred in their cells.
 
-    Its arrays, one entry a node: `point`; `density` and `smoothing_length`, means over the cell's nodes as its
-    position is; `cell`, the indices of those nodes, shape (m, 2ᵈ).
+    Its arrays, one entry a node: `point`; `volume`, `density` and `smoothing_length`, means over the cell's nodes
+    as its position is; `cell`, the indices of those nodes, shape (m, 2ᵈ).
     """
     cells = scene.lattice.cells
     auxiliary = types.AuxiliaryNodes()
     auxiliary.point = wp.zeros(len(cells), dtype=types.Point, device=device)
+    auxiliary.volume = wp.zeros(len(cells), dtype=precision.real, device=device)
     auxiliary.density = wp.zeros(len(cells), dtype=precision.real, device=device)
     auxiliary.smoothing_length = wp.zeros(len(cells), dtype=precision.real, device=device)
     auxiliary.cell = wp.array(cells, dtype=wp.int32, device=device)

@@ -9,6 +9,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.arrays import packed
 from ..ground.compiling import forward_kernel
 from ..ground.launching import Launcher
 from ..ground.linear_algebra import determinant_of
@@ -69,9 +70,13 @@ def _kernels(continuum, precision):
     determinant, corners = determinant_of(dim, precision), 2**dim
     edges_of = edges_function(continuum, precision)
 
+    packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
+    packed_tables = packed(wp.array2d(dtype=wp.int32))
+
     @forward_kernel
     def shift(first: int, dt: real, nodes: MaterialNodes):
         i = first + wp.tid()
+        packed_nodes(nodes)
         u = nodes.displacement[i] + dt * nodes.half_velocity[i]
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
@@ -102,6 +107,8 @@ def _kernels(continuum, precision):
         outdated: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
+        packed_nodes(nodes)
+        packed_auxiliary(auxiliary)
         x = vector()
         for k in range(wp.static(corners)):
             i = auxiliary.cell[a, k]
@@ -113,7 +120,7 @@ def _kernels(continuum, precision):
         if support * wp.max(h - listed_h[a], real(0.0)) > half_skin:
             outdated[0] = 1
         volume = wp.max(determinant(edges), real(SMALLEST) * initial_volume[a])
-        auxiliary.point[a].volume = volume
+        auxiliary.volume[a] = volume
         auxiliary.density[a] = reference_density * initial_volume[a] / volume
 
     @forward_kernel
@@ -129,15 +136,18 @@ def _kernels(continuum, precision):
         outdated: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
+        packed_nodes(nodes)
+        packed_auxiliary(auxiliary)
+        packed_tables(of_node)
         total, found, h = real(0.0), real(0.0), real(0.0)
         for k in range(wp.static(corners)):
             a = of_node[i, k]
             if a >= 0:
-                total += auxiliary.point[a].volume
+                total += auxiliary.volume[a]
                 found += real(1.0)
                 h = wp.max(h, auxiliary.smoothing_length[a])
         volume = total / found
-        nodes.point[i].volume = volume
+        nodes.volume[i] = volume
         nodes.density[i] = nodes.weight[i] / volume
         nodes.smoothing_length[i] = h
         u = nodes.displacement[i]

@@ -17,12 +17,14 @@ Where the cell is no parallelogram the linear part of f has such modes as well; 
 """
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import warp as wp
 
+from ..ground.arrays import natural, packed
 from ..ground.linear_algebra import determinant_of, inverse_of
 from ..ground.precision import Precision
 from ..nodes.node_sets import node_types
@@ -40,15 +42,20 @@ class CellTypes:
 
     Attributes:
         Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
-        Cells: `cell` (m,) and `of_node` (n, 2ᵈ), the cell whose corner k a node is, or −1.
+        Cells: `numbers` (c, m), the c numbers of each `Cell`, and `of_node` (n, 2ᵈ), the cell whose corner k a
+            node is, or −1.
+        new: (lattice, device) → Cells, all numbers zero.
         describe: (cell, auxiliary nodes, nodes) → mean of φ, Cell without its gradient.
+        write: (cell, Cell, Cells) → nothing.
         gather: (node, Cells, auxiliary nodes, κ) → means over the cells of a node: of the auxiliary nodes'
             values, of ∇φ (∇v a share κ of the way to the node's corner), of Σ_S s_S f_S, and of the frames.
     """
 
     Cell: type
     Cells: type
+    new: Callable
     describe: wp.Function
+    write: wp.Function
     gather: wp.Function
 
 
@@ -102,9 +109,19 @@ def frame_function(continuum: Continuum, precision: Precision) -> wp.Function:
     return frame_of
 
 
+def apart_on(device: wp.Device) -> bool:
+    """Whether the numbers of a cell are kept apart from each other: for neighbouring threads of a GPU."""
+    return not device.is_cpu
+
+
 @cache
-def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
-    """The types and functions of one continuum in one precision."""
+def cell_types(continuum: Continuum, precision: Precision, apart: bool = False) -> CellTypes:
+    """The types and functions of one continuum in one precision.
+
+    Args:
+        apart: whether the same number of consecutive cells stands side by side in memory, for a GPU whose threads
+            read it together, or all the numbers of a cell, for the vector registers of a CPU.
+    """
     types, dim = node_types(continuum, precision), continuum.dim
     real, phi, tensor, phi_gradient = precision.real, types.phi, types.tensor, types.phi_gradient
     AuxiliaryNodes, Point = types.AuxiliaryNodes, types.Point
@@ -128,15 +145,61 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
 
     @wp.struct
     class Cells:
-        cell: wp.array(dtype=Cell)
+        numbers: wp.array2d(dtype=real)
         of_node: wp.array2d(dtype=wp.int32)
+
+    modes_at = types.size * dim  # where a cell's modes begin among its numbers, and where its frame does
+    frame_at = modes_at + types.size * columns
+    packed_points, packed_tables, packed_numbers = (
+        packed(wp.array(dtype=Point)),
+        packed(wp.array2d(dtype=wp.int32)),
+        packed(wp.array2d(dtype=real), axis=1 if apart else 0),
+    )
+
+    def new(lattice: Lattice, device: wp.Device):
+        cells, m, numbers = Cells(), len(lattice.cells), frame_at + dim * dim
+        if apart:
+            cells.numbers = wp.zeros((numbers, m), dtype=real, device=device)
+        else:
+            cells.numbers = wp.zeros((m, numbers), dtype=real, device=device).transpose()
+        cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
+        return cells
+
+    @wp.func
+    def write(a: int, cell: Cell, cells: Cells):
+        packed_numbers(cells.numbers)
+        for i in range(wp.static(types.size)):
+            for j in range(wp.static(dim)):
+                cells.numbers[dim * i + j, a] = cell.gradient[i, j]
+            for j in range(wp.static(columns)):
+                cells.numbers[modes_at + columns * i + j, a] = cell.modes[i, j]
+        for i in range(wp.static(dim)):
+            for j in range(wp.static(dim)):
+                cells.numbers[frame_at + dim * i + j, a] = cell.frame[i, j]
+
+    @wp.func
+    def read(a: int, numbers: wp.array2d(dtype=real)):
+        cell = Cell()
+        for i in range(wp.static(types.size)):
+            for j in range(wp.static(dim)):
+                cell.gradient[i, j] = numbers[dim * i + j, a]
+            for j in range(wp.static(columns)):
+                cell.modes[i, j] = numbers[modes_at + columns * i + j, a]
+        for i in range(wp.static(dim)):
+            for j in range(wp.static(dim)):
+                cell.frame[i, j] = numbers[frame_at + dim * i + j, a]
+        return cell
 
     @wp.func
     def describe(a: int, auxiliary: AuxiliaryNodes, nodes: wp.array(dtype=Point)):
+        packed_points(nodes)
+        packed_tables(auxiliary.cell)
         cell = Cell()
         mean, slopes, edges, bends = phi(), phi_gradient(), tensor(), position_modes()
         for k in range(wp.static(corners)):
-            point = nodes[auxiliary.cell[a, k]]
+            i = auxiliary.cell[a, k]
+            natural(i)
+            point = nodes[i]
             mean += point.phi
             edges += wp.outer(point.x, side[k])
             slopes += wp.outer(point.phi, side[k])
@@ -162,26 +225,39 @@ def cell_types(continuum: Continuum, precision: Precision) -> CellTypes:
         return slopes
 
     @wp.func
-    def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
+    def means(
+        i: int,
+        of_node: wp.array2d(dtype=wp.int32),
+        numbers: wp.array2d(dtype=real),
+        auxiliary: wp.array(dtype=Point),
+        share: real,
+    ):
+        packed_tables(of_node)
+        packed_numbers(numbers)
+        packed_points(auxiliary)
         value, gradient, checkerboard, frame, found = phi(), phi_gradient(), phi(), tensor(), real(0.0)
         beyond = tensor()  # what ∇v has beyond that in the middles
         for k in range(wp.static(corners)):
-            a = cells.of_node[i, k]
+            a = of_node[i, k]
             if a >= 0:
                 found += real(1.0)
                 value += auxiliary[a].phi
-                gradient += cells.cell[a].gradient
-                frame += cells.cell[a].frame
+                cell = read(a, numbers)
+                gradient += cell.gradient
+                frame += cell.frame
                 if wp.static(number > 0):
-                    modes = cells.cell[a].modes
-                    beyond += modes[: wp.static(dim)] * (mode_slopes(side[k], share) * cells.cell[a].frame)
-                    checkerboard += modes * sign[k]
+                    beyond += cell.modes[: wp.static(dim)] * (mode_slopes(side[k], share) * cell.frame)
+                    checkerboard += cell.modes * sign[k]
         for row in range(wp.static(dim)):
             gradient[row] += beyond[row]
         part = real(1.0) / found
         return part * value, part * gradient, part * checkerboard, part * frame
 
-    return CellTypes(Cell, Cells, describe, gather)
+    @wp.func
+    def gather(i: int, cells: Cells, auxiliary: wp.array(dtype=Point), share: real):
+        return means(i, cells.of_node, cells.numbers, auxiliary, share)
+
+    return CellTypes(Cell, Cells, new, describe, write, gather)
 
 
 def cells_of_nodes(lattice: Lattice) -> np.ndarray:

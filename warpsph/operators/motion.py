@@ -143,7 +143,7 @@ def _move_kernel(continuum: Continuum, precision: Precision):
         h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / dim)))
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
-        nodes.point[i].volume = nodes.weight[i] / density
+        nodes.volume[i] = nodes.weight[i] / density
         nodes.density[i] = density
         nodes.smoothing_length[i] = h
         # A pair inside the support now was inside support + skin at `mark` while this holds at both its ends.
@@ -169,12 +169,12 @@ def centre_kernel(continuum: Continuum, precision: Precision):
         for k in range(wp.static(corners)):
             i = auxiliary.cell[a, k]
             x += nodes.point[i].x
-            volume += nodes.point[i].volume
+            volume += nodes.volume[i]
             density += nodes.density[i]
             h += nodes.smoothing_length[i]
         share = real(wp.static(1.0 / corners))
         auxiliary.point[a].x = share * x
-        auxiliary.point[a].volume = share * volume
+        auxiliary.volume[a] = share * volume
         auxiliary.density[a] = share * density
         auxiliary.smoothing_length[a] = share * h
 

@@ -136,7 +136,7 @@ class SurfaceScan:
         b, device = self.candidates.node.shape[0], self.row.device
         wp.launch(self._gather, b, [self._ratio, nodes, self.candidates], device=device)
         self._around.build()
-        wp.launch(self._scan, b, [self.pairs, nodes.point, self.candidates], device=device)
+        wp.launch(self._scan, b, [self.pairs, nodes, self.candidates], device=device)
         if self._improves:
             wp.launch(self._fit, b, [self.pairs, self.row, self.candidates], device=device)
 
@@ -166,7 +166,7 @@ def _gather_kernel(continuum: Continuum, precision: Precision):
         c = wp.tid()
         i = candidates.node[c]
         candidates.point[c] = nodes.point[i]
-        spacing = wp.pow(nodes.point[i].volume, real(wp.static(1.0 / continuum.dim)))
+        spacing = wp.pow(nodes.volume[i], real(wp.static(1.0 / continuum.dim)))
         candidates.smoothing_length[c] = ratio * spacing
 
     return gather
@@ -175,20 +175,20 @@ def _gather_kernel(continuum: Continuum, precision: Precision):
 @cache
 def _scan_kernel(continuum: Continuum, precision: Precision):
     types, Candidates = node_types(continuum, precision), surface_types(continuum, precision).Candidates
-    real, vector, tensor, Point = precision.real, types.vector, types.tensor, types.Point
+    real, vector, tensor, MaterialNodes = precision.real, types.vector, types.tensor, types.MaterialNodes
     weights, inverse = wendland_c2(precision), symmetric_inverse(continuum.dim, precision)
 
     @wp.func
-    def scan_normal(x: vector, h: real, start: int, end: int, pairs: PairList, points: wp.array(dtype=Point)):
+    def scan_normal(x: vector, h: real, start: int, end: int, pairs: PairList, nodes: MaterialNodes):
         a = tensor()
         sum_grad_w = vector()
         for k in range(start, end):
-            neighbour = points[pairs.index[k]]
-            r = neighbour.x - x
+            j = pairs.index[k]
+            r = nodes.point[j].x - x
             s = wp.dot(r, r) / (h * h)
             if s < real(SUPPORT_SQUARED):
                 _, g = weights(s)
-                grad_w = (g * neighbour.volume) * r
+                grad_w = (g * nodes.volume[j]) * r
                 a += wp.outer(grad_w, r)
                 sum_grad_w += grad_w
         return wp.normalize(-(inverse(a) * sum_grad_w))
@@ -204,15 +204,15 @@ def _scan_kernel(continuum: Continuum, precision: Precision):
         return above * above + side * side < reach * reach
 
     @forward_kernel
-    def scan(pairs: PairList, points: wp.array(dtype=Point), candidates: Candidates):
+    def scan(pairs: PairList, nodes: MaterialNodes, candidates: Candidates):
         c = wp.tid()
         x, h = candidates.point[c].x, candidates.smoothing_length[c]
         start, end = pairs.start[c], pairs.start[c + 1]
-        n = scan_normal(x, h, start, end, pairs, points)
+        n = scan_normal(x, h, start, end, pairs, nodes)
         exposed = wp.int32(1)
         for k in range(start, end):
             j = pairs.index[k]
-            if j != candidates.node[c] and in_scan_region(points[j].x - x, n, h):
+            if j != candidates.node[c] and in_scan_region(nodes.point[j].x - x, n, h):
                 exposed = 0
         candidates.scan_normal[c] = n
         candidates.exposed[c] = exposed

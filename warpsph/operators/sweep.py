@@ -14,6 +14,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.arrays import natural, packed
 from ..ground.linear_algebra import symmetric_inverse
 from ..ground.precision import Precision
 from ..ground.smoothing import SMOOTHING_FUNCTIONS
@@ -28,9 +29,9 @@ class Sweep:
     """The functions of one pass.
 
     Attributes:
-        collect: (target index, its x and metric M, base value, pair list, source points) → Sums. ξ² = |M r|²:
-            M = 1/h for a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes MᵀM out of ∇W
-            again.
+        collect: (target index, its x and metric M, base value, pair list, source points, their volumes) → Sums.
+            ξ² = |M r|²: M = 1/h for a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes
+            MᵀM out of ∇W again.
         value: Sums → Shepard value; the base value where no neighbour is left.
         round_metric: h → 1/h.
         cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in
@@ -73,6 +74,9 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
     support_squared = EDGE * KERNELS[kernel].support ** 2
+    packed_points, packed_volumes, packed_list = (
+        packed(arrays) for arrays in (wp.array(dtype=Point), wp.array(dtype=real), PairList)
+    )
 
     @wp.struct
     class Sums:
@@ -84,13 +88,21 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
         g_phi: gradient_rows  # Σ V ∇W ⊗ (φ_J − base), so that a φ_J is read and added up in one piece
 
     @wp.func
+    def neighbour(place: int, pairs: PairList):
+        natural(place)
+        j = pairs.index[place]
+        natural(j)
+        return j
+
+    @wp.func
     def weigh(x: vector, metric: tensor, first: int, count: int, pairs: PairList, sources: wp.array(dtype=Point)):
         """W and −W′/ξ of so many neighbours from `first` on, zero outside the support."""
+        packed_points(sources)
+        packed_list(pairs)
         xi2, w, g = real_batch(), real_batch(), real_batch()
         n = wp.int32(0)
         while n < count:
-            j = pairs.index[first + n]
-            xi = metric * (sources[j].x - x)
+            xi = metric * (sources[neighbour(first + n, pairs)].x - x)
             xi2[n] = wp.dot(xi, xi)
             n += 1
         n = wp.int32(0)
@@ -103,8 +115,17 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
 
     @wp.func
     def collect(
-        target: int, x: vector, metric: tensor, base: phi, pairs: PairList, sources: wp.array(dtype=Point)
+        target: int,
+        x: vector,
+        metric: tensor,
+        base: phi,
+        pairs: PairList,
+        sources: wp.array(dtype=Point),
+        volume: wp.array(dtype=real),
     ):
+        packed_points(sources)
+        packed_volumes(volume)
+        packed_list(pairs)
         sums = Sums()
         sums.base = base
         first, end = int(pairs.start[target]), pairs.start[target + 1]
@@ -113,10 +134,11 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
             w, g = weigh(x, metric, first, count, pairs, sources)
             n = wp.int32(0)
             while n < count:
-                neighbour = sources[pairs.index[first + n]]
-                r = neighbour.x - x
-                w_n, g_n = w[n] * neighbour.volume, g[n] * neighbour.volume
-                difference = neighbour.phi - base
+                j = neighbour(first + n, pairs)
+                point = sources[j]
+                r = point.x - x
+                w_n, g_n = w[n] * volume[j], g[n] * volume[j]
+                difference = point.phi - base
                 sums.w += w_n
                 sums.w_phi += w_n * difference
                 grad_w = g_n * r

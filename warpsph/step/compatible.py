@@ -16,6 +16,7 @@ from functools import cache
 
 import warp as wp
 
+from ..ground.arrays import packed
 from ..ground.compiling import forward_kernel
 from ..ground.kinematics import kinematics
 from ..ground.launching import Launcher
@@ -24,7 +25,7 @@ from ..ground.precision import Precision
 from ..ground.unknowns import unknowns
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
-from ..operators.cells import cell_types, cells_of_nodes
+from ..operators.cells import apart_on, cell_types
 from ..operators.clock import HALF
 from ..operators.conditions import ConditionTypes
 from ..operators.damping import taken_off
@@ -90,15 +91,16 @@ class CompatibleFluxes:
         lattice, kernel = scene.lattice, scene.numerics.kernel
         continuum, moves = lattice.continuum, scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
-        types, device = cell_types(continuum, precision), launcher.device
+        device = launcher.device
+        apart = apart_on(device)
         self._launcher = launcher
         self._dim, self._reach = lattice.dim, scene.numerics.support
-        self._cells = types.Cells()
-        self._cells.cell = wp.zeros(len(lattice.cells), dtype=types.Cell, device=device)
-        self._cells.of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
+        self._cells = cell_types(continuum, precision, apart).new(lattice, device)
         parts = sweep(continuum, precision, kernel, batch_on(device))
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law)
-        self._to_nodes = _to_nodes_kernel(continuum, precision, parts, ratio, law.Parameters, moves, conditions)
+        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law, apart)
+        self._to_nodes = _to_nodes_kernel(
+            continuum, precision, parts, ratio, law.Parameters, moves, conditions, apart
+        )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
     def to_auxiliary(
@@ -117,12 +119,14 @@ class CompatibleFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Sweep, ratio: float, law: Law):
+def _to_auxiliary_kernel(
+    continuum: Continuum, precision: Precision, parts: Sweep, ratio: float, law: Law, apart: bool
+):
     Parameters, relax, internal = law.Parameters, law.relax, precision.vec(max(1, len(law.history)))
     corners = 2**continuum.dim
-    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision)
+    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision, apart)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    Cells, describe = cells_types.Cells, cells_types.describe
+    Cells, describe, write = cells_types.Cells, cells_types.describe, cells_types.write
     phi_of, spherical = unknowns(continuum, precision), kinematics(continuum, precision).spherical
     join, velocity_gradient, vector = phi_of.join, phi_of.velocity_gradient, types.vector
     velocity, stress, tensor = phi_of.velocity, phi_of.stress, types.tensor
@@ -130,6 +134,8 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
     rate = wave_rate(continuum, precision, Parameters)
     metric_of = parts.cell_metric(ratio)
     collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
+
+    packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
 
     @forward_kernel
     def to_auxiliary(
@@ -144,9 +150,12 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
         cells: Cells,
     ):
         a = first + wp.tid()
+        packed_nodes(nodes)
+        packed_auxiliary(auxiliary)
         point = auxiliary.point[a]
         phi, cell = describe(a, auxiliary, nodes.point)  # 3
-        sums = collect(a, point.x, metric_of(cell.frame, auxiliary.smoothing_length[a]), phi, pairs, nodes.point)
+        metric = metric_of(cell.frame, auxiliary.smoothing_length[a])
+        sums = collect(a, point.x, metric, phi, pairs, nodes.point, nodes.volume)
         cell.gradient = gradient(sums, phi)
         minus_div_f = rate(cell.gradient, real(1.0) / auxiliary.density[a], material)  # 4-5
         volumetric = wp.trace(velocity_gradient(cell.gradient))
@@ -162,7 +171,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
             flowed, _ = relax(stress(half) - elastic, mean, material, real(0.5) * dt)
             half = join(velocity(half), flowed + elastic)
         auxiliary.point[a].phi = half - phi + join(vector(), spherical(q))
-        cells.cell[a] = cell
+        write(a, cell, cells)
 
     return to_auxiliary
 
@@ -176,8 +185,9 @@ def _to_nodes_kernel(
     Parameters: type,
     moves: bool,
     conditions: ConditionTypes,
+    apart: bool,
 ):
-    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision)
+    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision, apart)
     real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
     phi = unknowns(continuum, precision)
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
@@ -185,6 +195,8 @@ def _to_nodes_kernel(
     rate, taken_off_stress = wave_rate(continuum, precision, Parameters), taken_off(continuum, precision)
     collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
     to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
+
+    packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
 
     @forward_kernel
     def to_nodes(
@@ -199,12 +211,13 @@ def _to_nodes_kernel(
         nodes: MaterialNodes,
     ):
         i = first + wp.tid()
+        packed_nodes(nodes)
+        packed_auxiliary(auxiliary)
         point = nodes.point[i]
         increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share)
         phi_half = apply(i, point.phi + increment, HALF, conditions)  # 7
-        sums = collect(
-            i, point.x, metric_of(frame, nodes.smoothing_length[i]), types.phi(), pairs, auxiliary.point
-        )
+        metric = metric_of(frame, nodes.smoothing_length[i])
+        sums = collect(i, point.x, metric, types.phi(), pairs, auxiliary.point, auxiliary.volume)
         grad, volume_ratio = to_half_step(grad_s + gradient(sums, phi_half - point.phi), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 

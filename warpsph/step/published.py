@@ -83,7 +83,8 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
     ):
         a = first + wp.tid()
         point = auxiliary.point[a]
-        sums = collect(a, point.x, round_metric(auxiliary.smoothing_length[a]), point.phi, pairs, nodes.point)
+        metric = round_metric(auxiliary.smoothing_length[a])
+        sums = collect(a, point.x, metric, point.phi, pairs, nodes.point, nodes.volume)
         phi = value(sums)  # 3
         minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
         auxiliary.point[a].phi = phi + real(0.5) * dt * minus_div_f  # 6
@@ -124,7 +125,8 @@ def _to_nodes_kernel(
     ):
         i = first + wp.tid()
         point = nodes.point[i]
-        sums = collect(i, point.x, round_metric(nodes.smoothing_length[i]), point.phi, pairs, auxiliary.point)
+        metric = round_metric(nodes.smoothing_length[i])
+        sums = collect(i, point.x, metric, point.phi, pairs, auxiliary.point, auxiliary.volume)
         phi_half = apply(i, value(sums), HALF, conditions)  # 7
         grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
