@@ -130,8 +130,8 @@ def test_counts_of_a_bar_by_hand():
     entries = 3 + 4 + 4 + 3 + 2 + 3 + 4 + 3 + 2
     assert counting.pairs(simulation._stepper._around_nodes) == 2 + 3 + 4 + 3 + 2
     assert counting.flops_per_node_step(simulation) == pytest.approx((entries * 21 + 9 * 16) / 5)
-    point, row = 4 * 8, 4
+    point, row = 3 * 8, 4
     moved = counting.bytes_per_node_step(simulation, timing.PHASES)
-    assert moved["conditions"] == 2 * point + row
+    assert moved["conditions"] == 2 * point + 8 + row
     assert "sources" not in timing.time_phases(simulation)
     assert counting.memory_per_node(simulation) > point + 3 * 8

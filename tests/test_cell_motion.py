@@ -30,14 +30,21 @@ def simulation_of(dim, device, precision, cells=4, mapped=jitter, **numerics):
     return Simulation(scene, device=device, precision=precision)
 
 
+def move(simulation, dt):
+    """Step 14 alone."""
+    stepper = simulation._stepper
+    stepper.clock.begin([0.0], dt)
+    stepper._motion.move(simulation.nodes, simulation.auxiliary, stepper.clock.time_step)
+
+
 def moved(simulation, F):
     """Moved by x → F x in four unequal steps of the cells' motion."""
-    motion, reference = simulation._stepper._motion, simulation.lattice.nodes
+    reference = simulation.lattice.nodes
     there, done = reference @ F.T, 0.0
     for part in (0.1, 0.4, 0.3, 0.2):
         dt = 0.5
         simulation.nodes.half_velocity.assign(part / dt * (there - reference))
-        motion.move(simulation.nodes, simulation.auxiliary, dt)
+        move(simulation, dt)
         done += part
     assert done == pytest.approx(1.0)
     return simulation
@@ -147,7 +154,7 @@ def test_a_folded_cell_keeps_a_tenth_of_its_volume(device, precision):
     corner, velocity = simulation.nearest_node((0.0, 0.0)), np.zeros((25, 2))
     velocity[corner] = (0.6, 0.6)
     simulation.nodes.half_velocity.assign(velocity)
-    simulation._stepper._motion.move(simulation.nodes, simulation.auxiliary, 1.0)
+    move(simulation, 1.0)
     density = simulation.field("density")
     assert density[corner] == pytest.approx(SOFT.density / SMALLEST_VOLUME, rel=ROUNDING[precision])
     assert np.isfinite(density).all() and density.min() >= SOFT.density * (1 - ROUNDING[precision])
@@ -214,6 +221,6 @@ def test_a_folded_cell_does_not_shorten_the_step(precision):
     corner, velocity = simulation.nearest_node((0.0, 0.0)), np.zeros((25, 2))
     velocity[corner] = (0.6, 0.6)
     simulation.nodes.half_velocity.assign(velocity)
-    simulation._stepper._motion.move(simulation.nodes, simulation.auxiliary, 1.0)
+    move(simulation, 1.0)
     simulation._stepper._build_lists()
     assert simulation._stepper.shrinkage == pytest.approx(1.0, rel=ROUNDING[precision])

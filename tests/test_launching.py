@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -111,6 +112,26 @@ def test_a_driver_without_loops_makes_the_same_steps(monkeypatch):
     expected = state_after(Simulation(pressed(), device="cpu", threads=1))
     monkeypatch.setattr(launching, "_loops_itself", lambda device: False)
     assert state_after(Simulation(pressed(), device="cpu", threads=1)) == expected
+
+
+def test_one_recording_serves_every_time_step(device):
+    """Δt is on the device: steps of other lengths are replayed, as are those after lists were built in place."""
+    replayed, made_one_by_one = (Simulation(pressed(), device, threads=1) for _ in range(2))
+    replayed.step()
+    recording = replayed._stepper._recording
+    for share in (1.0, 0.3, 0.7):
+        replayed.step(share * replayed.time_step_limit)
+    replayed._stepper._build_lists()
+    replayed.step()
+    assert replayed._stepper._recording is recording
+
+    made_one_by_one._stepper._record = lambda: SimpleNamespace(run=made_one_by_one._stepper.step)
+    for share in (1.0, 1.0, 0.3, 0.7):
+        made_one_by_one.step(share * made_one_by_one.time_step_limit)
+    made_one_by_one._stepper._build_lists()
+    made_one_by_one.step()
+    for name in STATE:
+        assert np.array_equal(replayed.field(name), made_one_by_one.field(name)), name
 
 
 def test_an_observer_is_told_after_the_first_step_at_its_time():

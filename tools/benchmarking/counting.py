@@ -13,7 +13,8 @@ import warp as wp
 
 from warpsph import Simulation
 
-# phase: (times a step, arrays read, arrays written), as attributes of the stepper; "pairs" are list entries.
+# phase: (times a step, arrays read, arrays written), as attributes of the stepper, for the default numerics;
+# "pairs" are list entries.
 TRAFFIC = {
     "sources": (2, ("nodes.point", "nodes.velocity_gradient", "history"), ("nodes.point", "history")),
     "to_auxiliary": (
@@ -21,17 +22,24 @@ TRAFFIC = {
         (
             "_around_auxiliary.pairs",
             "nodes.point",
+            "nodes.volume",
+            "nodes.velocity_gradient",
+            "history",
             "auxiliary.point",
             "auxiliary.smoothing_length",
             "auxiliary.density",
+            "auxiliary.cell",
         ),
-        ("auxiliary.point",),
+        ("auxiliary.point", "_fluxes._cells.numbers"),
     ),
     "to_nodes": (
         1,
         (
             "_around_nodes.pairs",
             "auxiliary.point",
+            "auxiliary.volume",
+            "_fluxes._cells.numbers",
+            "_fluxes._cells.of_node",
             "nodes.point",
             "nodes.smoothing_length",
             "nodes.density",
@@ -40,7 +48,7 @@ TRAFFIC = {
         ),
         ("nodes.point", "nodes.half_velocity", "nodes.velocity_gradient"),
     ),
-    "conditions": (1, ("nodes.point", "conditions.table.row"), ("nodes.point",)),
+    "conditions": (1, ("nodes.point", "nodes.displacement", "conditions.table.row"), ("nodes.point",)),
     "motion": (
         1,
         (
@@ -48,28 +56,32 @@ TRAFFIC = {
             "nodes.point",
             "nodes.displacement",
             "nodes.half_velocity",
-            "nodes.velocity_gradient",
-            "nodes.density",
             "nodes.reference",
-            "nodes.weight",
-            "_motion._initial_smoothing_length",
-            "_motion._listed",
-            "_motion._listed_h",
-            # auxiliary nodes are re-centred
+            # the cells are measured
             "nodes.point",
-            "nodes.density",
-            "nodes.smoothing_length",
             "auxiliary.cell",
             "auxiliary.point",
+            "_motion._initial_volume",
+            "_motion._cell_h",
+            # the nodes get their share
+            "auxiliary.volume",
+            "auxiliary.smoothing_length",
+            "_motion._of_node",
+            "nodes.weight",
+            "nodes.displacement",
+            "_motion._listed",
+            "_motion._listed_h",
         ),
         (
             "nodes.point",
             "nodes.displacement",
-            "nodes.density",
-            "nodes.smoothing_length",
             "auxiliary.point",
+            "auxiliary.volume",
             "auxiliary.density",
             "auxiliary.smoothing_length",
+            "nodes.volume",
+            "nodes.density",
+            "nodes.smoothing_length",
         ),
     ),
 }
@@ -95,7 +107,7 @@ def _size(stepper, name: str) -> int:
         neighbours = operator.attrgetter(name.removesuffix(".pairs"))(stepper)
         return 4 * (pairs(neighbours) + neighbours.pairs.start.shape[0])
     array = operator.attrgetter(name)(stepper)
-    return 0 if array is None else array.shape[0] * array.strides[0]
+    return 0 if array is None else array.size * wp.types.type_size_in_bytes(array.dtype)
 
 
 def flops_per_node_step(simulation: Simulation) -> float:

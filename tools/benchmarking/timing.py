@@ -87,7 +87,7 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
             continue  # an object that does nothing
         object.__setattr__(owner, method, _timed(getattr(owner, method), phase, spent, simulation.device))
         wrapped.append((owner, method))
-    stepper._record = lambda dt: _Plain(stepper, dt)
+    stepper._record = lambda: _Plain(stepper)
     wrapped.append((stepper, "_record"))
     begin = time.perf_counter()
     advance_to_list_build(simulation)
@@ -102,12 +102,12 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
 class _Plain:
     """Steps made launch by launch."""
 
-    def __init__(self, stepper, dt: float):
-        self._stepper, self._dt = stepper, dt
+    def __init__(self, stepper):
+        self._stepper = stepper
 
     def run(self) -> None:
         while self._stepper.clock.going.numpy()[0]:
-            self._stepper.step(self._dt)
+            self._stepper.step()
 
 
 def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):

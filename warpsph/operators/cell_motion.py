@@ -51,7 +51,7 @@ class CellMotion(Motion):
         """Least time of a wave from node to node over the initial one, at most 1."""
         return self._spacing.shrinkage(nodes, auxiliary)
 
-    def move(self, nodes, auxiliary, dt: float) -> None:
+    def move(self, nodes, auxiliary, dt: wp.array) -> None:
         """x ← x + Δt v^{n+1/2}; then x, V, ρ and h of the cells, then V, ρ and h of the nodes."""
         self._launcher.launch(self._shift, nodes.point, [dt, nodes], gathers=False)
         inputs = [self._reference_density, self._initial_volume, self._ratio, self._support, 0.5 * self._skin]
@@ -74,10 +74,10 @@ def _kernels(continuum, precision):
     packed_tables = packed(wp.array2d(dtype=wp.int32))
 
     @forward_kernel
-    def shift(first: int, dt: real, nodes: MaterialNodes):
+    def shift(first: int, dt: wp.array(dtype=real), nodes: MaterialNodes):
         i = first + wp.tid()
         packed_nodes(nodes)
-        u = nodes.displacement[i] + dt * nodes.half_velocity[i]
+        u = nodes.displacement[i] + dt[0] * nodes.half_velocity[i]
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
 

@@ -39,6 +39,7 @@ class Clock:
         functions: the prescribed motions' functions of time, or constants.
 
     Attributes:
+        time_step: Δt [s].
         first_half, second_half: b at the start, the middle and the end of each half step.
         drive: values of the functions, those at t + Δt/2 in row `HALF`, those at t + Δt in row `END`.
         lists_outdated, surface_outdated, non_finite: one integer each, set by kernels.
@@ -62,6 +63,7 @@ class Clock:
         self._force = wp.zeros(STAGES, dtype=vector, device=device)
         self._drive = wp.zeros(2 * columns, dtype=real, device=device)
         self.drive = self._drive.reshape((2, columns))
+        self.time_step = wp.zeros(1, dtype=real, device=device)
         self._status = wp.zeros(5, dtype=wp.int32, device=device)  # steps made, steps to make, three flags
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
         self.first_half, self.second_half = self._force[:3], self._force[2:]
@@ -72,18 +74,19 @@ class Clock:
     def begin(self, times: Sequence[float], dt: float) -> None:
         """Get ready for the steps from each of the times [s], at most `LONGEST_RUN`, to Δt later."""
         half = 0.5 * dt
+        put(self.time_step, (dt,))
         if self._body_force is not None:
             stages = [(t, t + 0.5 * half, t + half, t + half + 0.5 * half, t + half + half) for t in times]
             forces = np.array([[self._body_force(t) for t in row] for row in stages], dtype=float)
-            _put(self._forces[: len(times)], forces)
-            _put(self._force, forces[0])
+            put(self._forces[: len(times)], forces)
+            put(self._force, forces[0])
         if self._functions:
             ends = [(t + half, t + dt) for t in times]
             drives = np.array([[_value(f, t) for t in row for f in self._functions] for row in ends])
-            _put(self._drives[: len(times)], drives)
-            _put(self._drive, drives[0])
-        _put(self._status[:2], (0, len(times)))
-        _put(self.going, (1,))
+            put(self._drives[: len(times)], drives)
+            put(self._drive, drives[0])
+        put(self._status[:2], (0, len(times)))
+        put(self.going, (1,))
 
     def tick(self) -> None:
         """Close a step: go on to the next, or end."""
@@ -100,7 +103,7 @@ def _value(function, t: float) -> float:
     return function(t) if callable(function) else function
 
 
-def _put(array: wp.array, values) -> None:
+def put(array: wp.array, values) -> None:
     """Write values into an array; on the CPU without the cost of a transfer."""
     if array.device.is_cpu:
         array.numpy()[...] = values

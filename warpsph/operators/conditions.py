@@ -126,8 +126,8 @@ class Conditions:
     def locate(self, nodes) -> None:
         """Nothing: all conditions are on nodes chosen once and for all."""
 
-    def turn(self, nodes, dt: float) -> None:
-        """Turn the directions of edges that nobody moves as the stresses turn in the same time."""
+    def turn(self, nodes, dt: wp.array) -> None:
+        """Turn the directions of edges that nobody moves as the stresses turn in half a time step."""
         if self._turns.shape[0]:
             inputs = [nodes, self._turns, self._node, dt, self.table]
             self._launcher.launch(self._turn, self._turns, inputs)
@@ -169,10 +169,11 @@ def turn_kernel(continuum: Continuum, precision: Precision, conditions: Conditio
         nodes: MaterialNodes,
         turns: wp.array(dtype=wp.int32),
         node: wp.array(dtype=wp.int32),
-        dt: real,
+        dt: wp.array(dtype=real),
         table: Table,
     ):
         row = turns[first + wp.tid()]
-        table.turned[row] = rotation(nodes.velocity_gradient[node[row]], dt) * table.turned[row]
+        R = rotation(nodes.velocity_gradient[node[row]], real(0.5) * dt[0])
+        table.turned[row] = R * table.turned[row]
 
     return turn

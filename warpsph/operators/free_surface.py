@@ -84,8 +84,8 @@ class FreeSurfaceConditions(Conditions):
         self._turned.zero_()
         self._outdated.zero_()
 
-    def turn(self, nodes, dt: float) -> None:
-        """Turn the directions freed as the stresses turn in the same time; never at small displacements.
+    def turn(self, nodes, dt: wp.array) -> None:
+        """Turn the directions freed as the stresses turn in half a time step; never at small displacements.
 
         A normal that lags by θ leaves the shear traction σ_tt θ, which drives a spinning body round.
         """
@@ -248,16 +248,17 @@ def _turn_kernel(continuum: Continuum, precision: Precision):
         first: int,
         nodes: MaterialNodes,
         candidates: Candidates,
-        dt: real,
+        dt: wp.array(dtype=real),
         table: Table,
         turned: wp.array(dtype=real),
         outdated: wp.array(dtype=wp.int32),
     ):
         c = first + wp.tid()
         L = nodes.velocity_gradient[candidates.node[c]]
-        R = rotation(L, dt)
+        half = real(0.5) * dt[0]
+        R = rotation(L, half)
         table.projector[c] = R * table.projector[c] * wp.transpose(R)
-        turned[c] += dt * wp.sqrt(wp.ddot(L, L))
+        turned[c] += half * wp.sqrt(wp.ddot(L, L))
         if turned[c] > real(LARGEST_TURN):
             outdated[0] = 1
 

@@ -29,7 +29,7 @@ class NoMotion:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def move(self, nodes, auxiliary, dt: float) -> None:
+    def move(self, nodes, auxiliary, dt: wp.array) -> None:
         """Nothing."""
 
     def mark(self, nodes, auxiliary) -> None:
@@ -74,7 +74,7 @@ class Motion:
         """1: the published schemes keep their step, since their viscosity depends on it."""
         return 1.0
 
-    def move(self, nodes, auxiliary, dt: float) -> None:
+    def move(self, nodes, auxiliary, dt: wp.array) -> None:
         """x ← x + Δt v^{n+1/2}, ρ ← ρ/(change of volume), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""
         inputs = [self._reference_density, self._initial_smoothing_length, self._support, 0.5 * self._skin, dt]
         inputs += [self._listed, self._listed_h, nodes, self._outdated]
@@ -127,17 +127,17 @@ def _move_kernel(continuum: Continuum, precision: Precision):
         initial_smoothing_length: wp.array(dtype=real),
         support: real,
         half_skin: real,
-        dt: real,
+        dt: wp.array(dtype=real),
         listed: wp.array(dtype=vector),
         listed_h: wp.array(dtype=real),
         nodes: MaterialNodes,
         outdated: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
-        u = nodes.displacement[i] + dt * nodes.half_velocity[i]
+        u = nodes.displacement[i] + dt[0] * nodes.half_velocity[i]
         # The exact change of volume of the map xⁿ → xⁿ + Δt v, whose gradient is (1 + ½ΔtL)(1 − ½ΔtL)⁻¹ when L
         # refers to the half step; to first order 1 + Δt tr(d).
-        half_stretch = real(0.5) * dt * nodes.velocity_gradient[i]
+        half_stretch = real(0.5) * dt[0] * nodes.velocity_gradient[i]
         volume_ratio = determinant(identity + half_stretch) / determinant(identity - half_stretch)
         density = nodes.density[i] / volume_ratio
         h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / dim)))

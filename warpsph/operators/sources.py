@@ -37,7 +37,7 @@ class NoSources:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def half_step(self, nodes, history, body_force: wp.array, dt: float) -> None:
+    def half_step(self, nodes, history, body_force: wp.array, dt: wp.array) -> None:
         """Nothing."""
 
 
@@ -64,13 +64,13 @@ class Sources:
         )
         self.kernels = (self._kernel,)
 
-    def half_step(self, nodes, history, body_force: wp.array, dt: float) -> None:
+    def half_step(self, nodes, history, body_force: wp.array, dt: wp.array) -> None:
         """Advance the nodes by their sources alone.
 
         Args:
             nodes: material nodes; φ and the history are updated in place.
             body_force: b [m/s²] at the start, in the middle and at the end, on the device.
-            dt: length, half a time step [s].
+            dt: the time step [s], on the device.
         """
         inputs = [self._parameters, body_force, self._damping, dt, nodes, history]
         self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
@@ -200,21 +200,22 @@ def source_kernel(
         material: Parameters,
         body_force: wp.array(dtype=vector),
         damping: real,
-        dt: real,
+        dt: wp.array(dtype=real),
         nodes: MaterialNodes,
         history: wp.array(dtype=internal),
     ):
         i = first + wp.tid()
+        half = real(0.5) * dt[0]
         point = nodes.point[i]
         v = velocity_of(point.phi)
         sigma = stress_of(point.phi)
         if wp.static(accelerates):
-            v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, dt)
+            v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, half)
         if wp.static(acts_on_stress):
             internals = internal()
             if wp.static(m > 0):
                 internals = history[i]
-            sigma, internals = advance_stress(sigma, internals, nodes.velocity_gradient[i], material, dt)
+            sigma, internals = advance_stress(sigma, internals, nodes.velocity_gradient[i], material, half)
             if wp.static(m > 0):
                 history[i] = internals
         nodes.point[i].phi = join(v, sigma)

@@ -26,7 +26,7 @@ from ..ground.unknowns import unknowns
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
 from ..operators.cells import apart_on, cell_types
-from ..operators.clock import HALF
+from ..operators.clock import HALF, put
 from ..operators.conditions import ConditionTypes
 from ..operators.damping import taken_off
 from ..operators.motion import half_step_gradient, initial_gradient
@@ -95,6 +95,7 @@ class CompatibleFluxes:
         apart = apart_on(device)
         self._launcher = launcher
         self._dim, self._reach = lattice.dim, scene.numerics.support
+        self._front, self._share = (wp.zeros(1, dtype=precision.real, device=device) for _ in range(2))
         self._cells = cell_types(continuum, precision, apart).new(lattice, device)
         parts = sweep(continuum, precision, kernel, batch_on(device))
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law, apart)
@@ -103,18 +104,20 @@ class CompatibleFluxes:
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(
-        self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary
-    ) -> None:
+    def set_courant(self, courant: float) -> None:
+        """The Courant number C = c_p Δt/Δx of the steps to come."""
+        front, share = STRENGTH * max(1.0 - courant**2, 0.0), corner_share(courant, self._dim, self._reach)
+        put(self._front, (front,))
+        put(self._share, (share,))
+
+    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        front = STRENGTH * max(1.0 - courant**2, 0.0)
-        inputs = [material, dt, front, pairs, nodes, history, auxiliary, self._cells]
+        inputs = [material, dt, self._front, pairs, nodes, history, auxiliary, self._cells]
         self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
 
-    def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
+    def to_nodes(self, material, conditions, dt: wp.array, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        share = corner_share(courant, self._dim, self._reach)
-        inputs = [material, conditions, dt, share, pairs, auxiliary, self._cells, nodes]
+        inputs = [material, conditions, dt, self._share, pairs, auxiliary, self._cells, nodes]
         self._launcher.launch(self._to_nodes, nodes.point, inputs)
 
 
@@ -141,8 +144,8 @@ def _to_auxiliary_kernel(
     def to_auxiliary(
         first: int,
         material: Parameters,
-        dt: real,
-        front: real,
+        time_step: wp.array(dtype=real),
+        front: wp.array(dtype=real),
         pairs: PairList,
         nodes: MaterialNodes,
         history: wp.array(dtype=internal),
@@ -152,14 +155,14 @@ def _to_auxiliary_kernel(
         a = first + wp.tid()
         packed_nodes(nodes)
         packed_auxiliary(auxiliary)
-        point = auxiliary.point[a]
+        dt, point = time_step[0], auxiliary.point[a]
         phi, cell = describe(a, auxiliary, nodes.point)  # 3
         metric = metric_of(cell.frame, auxiliary.smoothing_length[a])
         sums = collect(a, point.x, metric, phi, pairs, nodes.point, nodes.volume)
         cell.gradient = gradient(sums, phi)
         minus_div_f = rate(cell.gradient, real(1.0) / auxiliary.density[a], material)  # 4-5
         volumetric = wp.trace(velocity_gradient(cell.gradient))
-        q = front_pressure_at(a, volumetric, cell.frame, auxiliary, nodes, front, dt)
+        q = front_pressure_at(a, volumetric, cell.frame, auxiliary, nodes, front[0], dt)
         half = phi + real(0.5) * dt * minus_div_f  # 6
         if wp.static(relax is not None):
             mean, smooth = internal(), tensor()
@@ -203,8 +206,8 @@ def _to_nodes_kernel(
         first: int,
         material: Parameters,
         conditions: Table,
-        dt: real,
-        share: real,
+        time_step: wp.array(dtype=real),
+        share: wp.array(dtype=real),
         pairs: PairList,
         auxiliary: AuxiliaryNodes,
         cells: Cells,
@@ -213,8 +216,8 @@ def _to_nodes_kernel(
         i = first + wp.tid()
         packed_nodes(nodes)
         packed_auxiliary(auxiliary)
-        point = nodes.point[i]
-        increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share)
+        dt, point = time_step[0], nodes.point[i]
+        increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share[0])
         phi_half = apply(i, point.phi + increment, HALF, conditions)  # 7
         metric = metric_of(frame, nodes.smoothing_length[i])
         sums = collect(i, point.x, metric, types.phi(), pairs, auxiliary.point, auxiliary.volume)

@@ -51,14 +51,15 @@ class PublishedFluxes:
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
-    def to_auxiliary(
-        self, material, dt: float, courant: float, pairs: PairList, nodes, history, auxiliary
-    ) -> None:
+    def set_courant(self, courant: float) -> None:
+        """Nothing: the published schemes know the time step only."""
+
+    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, history, auxiliary) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
         self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
 
-    def to_nodes(self, material, conditions, dt: float, courant: float, pairs: PairList, auxiliary, nodes) -> None:
+    def to_nodes(self, material, conditions, dt: wp.array, pairs: PairList, auxiliary, nodes) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         inputs = [material, conditions, dt, pairs, auxiliary, nodes]
         self._launcher.launch(self._to_nodes, nodes.point, inputs)
@@ -76,7 +77,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
     def to_auxiliary(
         first: int,
         material: Parameters,
-        dt: real,
+        time_step: wp.array(dtype=real),
         pairs: PairList,
         nodes: MaterialNodes,
         auxiliary: AuxiliaryNodes,
@@ -87,7 +88,7 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
         sums = collect(a, point.x, metric, point.phi, pairs, nodes.point, nodes.volume)
         phi = value(sums)  # 3
         minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
-        auxiliary.point[a].phi = phi + real(0.5) * dt * minus_div_f  # 6
+        auxiliary.point[a].phi = phi + real(0.5) * time_step[0] * minus_div_f  # 6
 
     return to_auxiliary
 
@@ -118,13 +119,13 @@ def _to_nodes_kernel(
         first: int,
         material: Parameters,
         conditions: Table,
-        dt: real,
+        time_step: wp.array(dtype=real),
         pairs: PairList,
         auxiliary: AuxiliaryNodes,
         nodes: MaterialNodes,
     ):
         i = first + wp.tid()
-        point = nodes.point[i]
+        dt, point = time_step[0], nodes.point[i]
         metric = round_metric(nodes.smoothing_length[i])
         sums = collect(i, point.x, metric, point.phi, pairs, auxiliary.point, auxiliary.volume)
         phi_half = apply(i, value(sums), HALF, conditions)  # 7

@@ -83,7 +83,7 @@ class Stepper:
         self.list_builds, self.shrinkage = 0, 1.0
         self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
         self._build_lists()
-        self.clock.begin([0.0], 0.0)
+        self._begin([0.0], 0.0)
         self.conditions.apply(self.nodes)
         self._initial_spin(scene)
 
@@ -97,8 +97,8 @@ class Stepper:
         Returns:
             How many were made, at least one. When a value is not finite, the last step is the first with it.
         """
-        self.clock.begin(times, dt)
-        self._record(dt).run()
+        self._begin(times, dt)
+        self._record().run()
         outcome = self.clock.outcome()
         if outcome.lists_outdated and not outcome.non_finite:
             self._build_lists()
@@ -106,40 +106,40 @@ class Stepper:
             self.conditions.locate(self.nodes)
         return outcome
 
-    def step(self, dt: float) -> None:
-        """Advance the nodes by dt [s]; the numbers are those of METHOD section 3."""
-        self._sources.half_step(self.nodes, self.history, self.clock.first_half, 0.5 * dt)  # 1-2
-        self.conditions.turn(self.nodes, 0.5 * dt)
-        self.to_auxiliary(dt)  # 3-6
-        self.to_nodes(dt)  # 7-10
-        self._sources.half_step(self.nodes, self.history, self.clock.second_half, 0.5 * dt)  # 11-12
-        self.conditions.turn(self.nodes, 0.5 * dt)
+    def step(self) -> None:
+        """Advance the nodes by the clock's Δt; the numbers are those of METHOD section 3."""
+        dt = self.clock.time_step
+        self._sources.half_step(self.nodes, self.history, self.clock.first_half, dt)  # 1-2
+        self.conditions.turn(self.nodes, dt)
+        self.to_auxiliary()  # 3-6
+        self.to_nodes()  # 7-10
+        self._sources.half_step(self.nodes, self.history, self.clock.second_half, dt)  # 11-12
+        self.conditions.turn(self.nodes, dt)
         self.conditions.apply(self.nodes)  # 13
         self._motion.move(self.nodes, self.auxiliary, dt)  # 14
         self.clock.tick()
 
-    def to_auxiliary(self, dt: float) -> None:
+    def to_auxiliary(self) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        pairs = self._around_auxiliary.pairs
-        self._fluxes.to_auxiliary(
-            self._parameters, dt, self._courant(dt), pairs, self.nodes, self.history, self.auxiliary
-        )
+        dt, pairs = self.clock.time_step, self._around_auxiliary.pairs
+        self._fluxes.to_auxiliary(self._parameters, dt, pairs, self.nodes, self.history, self.auxiliary)
 
-    def to_nodes(self, dt: float) -> None:
+    def to_nodes(self) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        table, pairs = self.conditions.table, self._around_nodes.pairs
-        self._fluxes.to_nodes(self._parameters, table, dt, self._courant(dt), pairs, self.auxiliary, self.nodes)
+        dt, table, pairs = self.clock.time_step, self.conditions.table, self._around_nodes.pairs
+        self._fluxes.to_nodes(self._parameters, table, dt, pairs, self.auxiliary, self.nodes)
 
-    def _courant(self, dt: float) -> float:
-        """c_p Δt over the least present spacing."""
-        return dt * self._per_spacing / self.shrinkage
+    def _begin(self, times: Sequence[float], dt: float) -> None:
+        """Get ready for the steps from each of the times [s] to Δt later, with C of the least present spacing."""
+        self.clock.begin(times, dt)
+        self._fluxes.set_courant(dt * self._per_spacing / self.shrinkage)
 
-    def _record(self, dt: float) -> Recording:
-        """The step, recorded anew where one of the numbers or arrays in it is another one than last time."""
+    def _record(self) -> Recording:
+        """The step, recorded anew where lists have got new arrays."""
         lists = self._around_auxiliary.pairs, self._around_nodes.pairs
-        content = (dt, self.shrinkage, *(pairs.index.ptr for pairs in lists))
+        content = tuple(pairs.index.ptr for pairs in lists)
         if self._recorded != content:
-            self._recording = self._launcher.record(lambda: self.step(dt), self.clock.going)
+            self._recording = self._launcher.record(self.step, self.clock.going)
             self._recorded = content
         return self._recording
 
@@ -156,6 +156,6 @@ class Stepper:
         if not scene.initial_velocity.any():
             return
         start = wp.clone(self.nodes.point)
-        self.to_auxiliary(0.0)
-        self.to_nodes(0.0)
+        self.to_auxiliary()
+        self.to_nodes()
         wp.copy(self.nodes.point, start)
