@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable
 
 import warp as wp
 
-# Fused multiplications and additions, and −0 taken for 0, gain a tenth; NaN and infinities stay what they are.
-CPU_FLAGS = "-ffp-contract=fast -fno-signed-zeros"
+# Fused multiplications and additions, and −0 taken for 0, gain a tenth; NaN and infinities stay what they are. The
+# stack is aligned for vector registers: else a thread is up to an eighth slower, as its stack happens to begin.
+CPU_FLAGS = "-ffp-contract=fast -fno-signed-zeros -mstackrealign"
 
 
 def forward_kernel(function: Callable) -> wp.Kernel:

@@ -10,6 +10,7 @@ A launch from Python costs 10 to 20 µs, one replayed from a recording 0.1 to 0.
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple, Protocol
 
 import warp as wp
@@ -134,38 +135,59 @@ class _Loop:
 
 
 class _Lockstep:
-    """Each thread replays its share of a phase, then waits for the others."""
+    """Each thread replays its share of a phase, then waits for the others.
+
+    Phases too small for that are replayed by the one who comes last, while the others still wait.
+    """
 
     def __init__(self, launcher: Launcher, phases: list[list[_Launch]], going: wp.array):
         self._phases, self._together, self._going = phases, launcher._together, going
-        self._graphs = [
-            [_share(phase, thread, launcher) for phase in phases] for thread in range(launcher.threads)
+        threads = launcher.threads
+        shared: list[list[_Launch]] = []
+        alone: list[list[_Launch]] = []  # what is done after the shared phase in the same place
+        for phase in phases:
+            small = all(launch.over.shape[0] < SMALLEST_SHARE * threads for launch in phase)
+            if not small or not shared:
+                shared.append([] if small else phase)
+                alone.append([])
+            if small:
+                alone[-1] += phase
+        self._graphs = [[_graph(phase, k, threads, launcher) for phase in shared] for k in range(threads)]
+        self._barriers = [
+            threading.Barrier(threads, partial(_replay, _graph(phase, 0, 1, launcher))) for phase in alone
         ]
-        self._barrier = threading.Barrier(launcher.threads)
 
     def run(self) -> None:
         """Replay while the flag is not zero."""
-        self._barrier.reset()  # a run before this one may have failed
-        self._together(self._replay)
+        for barrier in self._barriers:
+            barrier.reset()  # a run before this one may have failed
+        self._together(self._run)
 
-    def _replay(self, thread: int) -> None:
+    def _run(self, thread: int) -> None:
+        stages = list(zip(self._graphs[thread], self._barriers, strict=True))
         try:
             while self._going.numpy()[0]:
-                for graph in self._graphs[thread]:
-                    if graph is not None:
-                        wp.capture_launch(graph)
-                    self._barrier.wait()
+                for graph, barrier in stages:
+                    _replay(graph)
+                    barrier.wait()
         except threading.BrokenBarrierError:
             pass  # another thread failed, and says why
         except BaseException:
-            self._barrier.abort()
+            for barrier in self._barriers:
+                barrier.abort()
             raise
 
 
-def _share(phase: list[_Launch], thread: int, launcher: Launcher) -> wp.Graph | None:
-    if thread and all(launch.over.shape[0] < SMALLEST_SHARE * launcher.threads for launch in phase):
+def _graph(phase: list[_Launch], thread: int, threads: int, launcher: Launcher) -> wp.Graph | None:
+    """What one of the threads has to do in a phase; None for nothing."""
+    if not phase:
         return None
     with wp.ScopedCapture(device=launcher.device) as capture:
         for launch in phase:
-            launch.part(thread, launcher.threads, launcher.device)
+            launch.part(thread, threads, launcher.device)
     return capture.graph
+
+
+def _replay(graph: wp.Graph | None) -> None:
+    if graph is not None:
+        wp.capture_launch(graph)

@@ -98,8 +98,9 @@ class Conditions:
         self.types = condition_types(continuum, precision)
         self.table = self.types.Table()
         self._kernel = apply_kernel(continuum, precision, self.types)
-        self._turns = wp.array(np.flatnonzero(~boundary.moved) if turns else [], dtype=wp.int32, device=device)
-        self._node = wp.array(boundary.nodes, dtype=wp.int32, device=device)
+        free = ~boundary.moved if turns else np.zeros(len(boundary.nodes), dtype=bool)
+        self._any_turns = bool(free.any())
+        self._turns = wp.array(free.astype(np.int32), dtype=wp.int32, device=device)
         self._turn = turn_kernel(continuum, precision, self.types)
         self.kernels = (self._kernel, self._turn)
         row = np.full(n, -1, dtype=np.int32)
@@ -128,9 +129,8 @@ class Conditions:
 
     def turn(self, nodes, dt: wp.array) -> None:
         """Turn the directions of edges that nobody moves as the stresses turn in half a time step."""
-        if self._turns.shape[0]:
-            inputs = [nodes, self._turns, self._node, dt, self.table]
-            self._launcher.launch(self._turn, self._turns, inputs)
+        if self._any_turns:
+            self._launcher.launch(self._turn, nodes.point, [nodes, self._turns, dt, self.table], gathers=False)
 
     def apply(self, nodes) -> None:
         """Step 13: impose the conditions at the end of the step on the nodes, in place; note values not finite."""
@@ -168,12 +168,15 @@ def turn_kernel(continuum: Continuum, precision: Precision, conditions: Conditio
         first: int,
         nodes: MaterialNodes,
         turns: wp.array(dtype=wp.int32),
-        node: wp.array(dtype=wp.int32),
         dt: wp.array(dtype=real),
         table: Table,
     ):
-        row = turns[first + wp.tid()]
-        R = rotation(nodes.velocity_gradient[node[row]], real(0.5) * dt[0])
-        table.turned[row] = R * table.turned[row]
+        i = first + wp.tid()
+        row = table.row[i]
+        if row < 0:
+            return
+        if turns[row] == 1:
+            R = rotation(nodes.velocity_gradient[i], real(0.5) * dt[0])
+            table.turned[row] = R * table.turned[row]
 
     return turn

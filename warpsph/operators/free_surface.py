@@ -90,8 +90,8 @@ class FreeSurfaceConditions(Conditions):
         A normal that lags by θ leaves the shear traction σ_tt θ, which drives a spinning body round.
         """
         if self._moves:
-            inputs = [nodes, self._scan.candidates, dt, self.table, self._turned, self._outdated]
-            self._launcher.launch(self._turn, self._turned, inputs)
+            inputs = [nodes, dt, self.table, self._turned, self._outdated]
+            self._launcher.launch(self._turn, nodes.point, inputs, gathers=False)
 
     def on_surface(self) -> np.ndarray:
         """Which nodes are on the free surface and not under a velocity condition, boolean, shape (n,)."""
@@ -237,24 +237,23 @@ def _project_kernel(continuum: Continuum, precision: Precision):
 @cache
 def _turn_kernel(continuum: Continuum, precision: Precision):
     MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
-    Candidates, Table = (
-        surface_types(continuum, precision).Candidates,
-        free_surface_types(continuum, precision).Table,
-    )
+    Table = free_surface_types(continuum, precision).Table
     rotation = rotation_of(continuum.dim, precision)
 
     @forward_kernel
     def turn(
         first: int,
         nodes: MaterialNodes,
-        candidates: Candidates,
         dt: wp.array(dtype=real),
         table: Table,
         turned: wp.array(dtype=real),
         outdated: wp.array(dtype=wp.int32),
     ):
-        c = first + wp.tid()
-        L = nodes.velocity_gradient[candidates.node[c]]
+        i = first + wp.tid()
+        c = table.row[i]
+        if c < 0:
+            return
+        L = nodes.velocity_gradient[i]
         half = real(0.5) * dt[0]
         R = rotation(L, half)
         table.projector[c] = R * table.projector[c] * wp.transpose(R)
