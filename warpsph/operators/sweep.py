@@ -3,9 +3,10 @@
     value      φ_I  = Σ V_J φ_J W_IJ / Σ V_J W_IJ                                  (Shepard)
     gradient   ∇φ_I = A_I⁻¹ Σ V_J (φ_J − φ_I) ∇W_IJ,   A_I = Σ V_J ∇W_IJ ⊗ (x_J − x_I)
 
-Both are linear in the neighbours' values, so one pass collects five sums and either follows from them, the
-gradient for any value φ_I of the point itself. The sums are taken of differences from a base value near the
-neighbours' (the one the target had last): in float32 the sums of the values themselves would cancel.
+Both are linear in the neighbours' values, so one pass collects sums and either follows from them, the gradient for
+any value φ_I of the point itself. The sums are taken of differences from a base value near the neighbours' (the one
+the target had last): in float32 the sums of the values themselves would cancel. Positions and values of a neighbour
+stand side by side and are added up as one row.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,7 @@ import warp as wp
 from ..ground.arrays import natural, packed
 from ..ground.linear_algebra import symmetric_inverse
 from ..ground.precision import Precision
+from ..ground.rows import add_scaled
 from ..ground.smoothing import SMOOTHING_FUNCTIONS
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
@@ -69,7 +71,8 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
     """
     types = node_types(continuum, precision)
     real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
-    Point, gradient_rows = types.Point, precision.mat(continuum.dim, types.size)
+    Point, dim, length = types.Point, continuum.dim, continuum.dim + types.size
+    row, rows, add_scaled_row = precision.vec(length), precision.mat(dim, length), add_scaled(length, precision)
     real_batch = precision.vec(batch)
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
@@ -80,12 +83,11 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
 
     @wp.struct
     class Sums:
-        w: real  # Σ V W
         base: phi
-        w_phi: phi  # Σ V W (φ_J − base)
+        w: real  # Σ V W
+        w_d: row  # Σ V W d, d = (x_J − x_I, φ_J − base)
         g: vector  # Σ V ∇W
-        g_x: tensor  # Σ V ∇W ⊗ (x_J − x_I)
-        g_phi: gradient_rows  # Σ V ∇W ⊗ (φ_J − base), so that a φ_J is read and added up in one piece
+        g_d: rows  # Σ V ∇W ⊗ d
 
     @wp.func
     def neighbour(place: int, pairs: PairList):
@@ -137,14 +139,16 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
                 j = neighbour(first + n, pairs)
                 point = sources[j]
                 r = point.x - x
+                d = row()
+                d[: wp.static(dim)] = r
+                d[wp.static(dim) :] = point.phi - base
                 w_n, g_n = w[n] * volume[j], g[n] * volume[j]
-                difference = point.phi - base
-                sums.w += w_n
-                sums.w_phi += w_n * difference
                 grad_w = g_n * r
+                sums.w += w_n
+                sums.w_d = add_scaled_row(sums.w_d, w_n, d)
                 sums.g += grad_w
-                sums.g_x += wp.outer(grad_w, r)
-                sums.g_phi += wp.outer(grad_w, difference)
+                for k in range(wp.static(dim)):
+                    sums.g_d[k] = add_scaled_row(sums.g_d[k], grad_w[k], d)
                 n += 1
             first += count
         return sums
@@ -153,17 +157,18 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
     def value(sums: Sums):
         result = sums.base
         if sums.w > real(0.0):
-            result += sums.w_phi / sums.w
+            result += sums.w_d[wp.static(dim) :] / sums.w
         return result
 
     @wp.func
     def gradient(sums: Sums, own: phi):
-        return wp.transpose(inverse(sums.g_x) * (sums.g_phi - wp.outer(sums.g, own - sums.base)))
+        a, b = sums.g_d[:, : wp.static(dim)], sums.g_d[:, wp.static(dim) :]
+        return wp.transpose(inverse(a) * (b - wp.outer(sums.g, own - sums.base)))
 
     @wp.func
     def round_metric(h: real):
         metric = tensor()
-        for k in range(wp.static(continuum.dim)):
+        for k in range(wp.static(dim)):
             metric[k, k] = real(1.0) / h
         return metric
 

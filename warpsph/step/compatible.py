@@ -220,7 +220,7 @@ def _to_nodes_kernel(
         increment, grad_s, checkerboard, frame = gather(i, cells, auxiliary.point, share[0])
         phi_half = apply(i, point.phi + increment, HALF, conditions)  # 7
         metric = metric_of(frame, nodes.smoothing_length[i])
-        sums = collect(i, point.x, metric, types.phi(), pairs, auxiliary.point, auxiliary.volume)
+        sums = collect(i, point.x, metric, increment, pairs, auxiliary.point, auxiliary.volume)
         grad, volume_ratio = to_half_step(grad_s + gradient(sums, phi_half - point.phi), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 
