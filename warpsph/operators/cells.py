@@ -224,6 +224,7 @@ def cell_types(continuum: Continuum, precision: Precision, apart: bool = False) 
                     slopes[s, a] = slope
         return slopes
 
+    # The arrays are arguments of their own: of those in a struct compilers find out less.
     @wp.func
     def means(
         i: int,
