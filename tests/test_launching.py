@@ -214,7 +214,7 @@ def test_threads_follow_the_size_and_the_environment(monkeypatch):
     assert choose_threads(None, 100) == 1
     assert choose_threads(None, 10_000_000) == all_cores()
     monkeypatch.setenv("WARPSPH_THREADS", "7")
-    assert (choose_threads(None, 10_000_000), choose_threads(None, 6000)) == (7, 3)
+    assert (choose_threads(None, 10_000_000), choose_threads(None, 6000)) == (7, 6)
     assert choose_threads(2, 10_000_000) == 2
     for wrong in ("0", "many", "-1", ""):
         monkeypatch.setenv("WARPSPH_THREADS", wrong)

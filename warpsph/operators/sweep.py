@@ -3,10 +3,10 @@
     value      φ_I  = Σ V_J φ_J W_IJ / Σ V_J W_IJ                                  (Shepard)
     gradient   ∇φ_I = A_I⁻¹ Σ V_J (φ_J − φ_I) ∇W_IJ,   A_I = Σ V_J ∇W_IJ ⊗ (x_J − x_I)
 
-Both are linear in the neighbours' values, so one pass collects sums and either follows from them, the gradient for
-any value φ_I of the point itself. The sums are taken of differences from a base value near the neighbours' (the one
-the target had last): in float32 the sums of the values themselves would cancel. Positions and values of a neighbour
-stand side by side and are added up as one row.
+Both are linear in the neighbours' values, so one pass collects sums and either follows from them, the gradient
+for any value φ_I of the point itself. The sums are taken of differences from a base value near the neighbours'
+(the one the target had last): in float32 the sums of the values themselves would cancel. Position and values of a
+neighbour stand side by side and are added up as one row.
 """
 
 from collections.abc import Callable

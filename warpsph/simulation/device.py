@@ -13,7 +13,7 @@ from ..errors import SceneError
 from ..ground.compiling import use_temporary_cache
 from ..scene.validate import index
 
-NODES_A_THREAD = 2000  # with fewer, threads wait for each other longer than they work
+NODES_A_THREAD = 1000  # with fewer, threads wait for each other longer than they work
 THREADS = "WARPSPH_THREADS"  # the environment variable that says how many a process may use
 
 

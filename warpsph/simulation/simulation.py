@@ -48,7 +48,7 @@ class Simulation:
         scene: the scene.
         device: Warp device name, e.g. `cpu` or `cuda:0`; the first GPU, or else the CPU, unless given.
         precision: `float64` or `float32`.
-        threads: number of CPU threads; results do not depend on it. Unless given, one for every 2000 nodes, at
+        threads: number of CPU threads; results do not depend on it. Unless given, one for every 1000 nodes, at
             most as many as the environment variable WARPSPH_THREADS says or there are cores.
 
     Attributes:
