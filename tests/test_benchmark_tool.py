@@ -135,3 +135,7 @@ def test_counts_of_a_bar_by_hand():
     assert moved["conditions"] == 2 * point + 8 + row
     assert "sources" not in timing.time_phases(simulation)
     assert counting.memory_per_node(simulation) > point + 3 * 8
+    cells = small(2)._stepper._fluxes._cells
+    found: dict[int, int] = {}
+    counting._collect_arrays(cells, found, set())
+    assert sum(found.values()) == 16 * 22 * 8 + 25 * 4 * 4, "22 numbers of each cell, four cells a node"

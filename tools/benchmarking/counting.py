@@ -107,7 +107,11 @@ def _size(stepper, name: str) -> int:
         neighbours = operator.attrgetter(name.removesuffix(".pairs"))(stepper)
         return 4 * (pairs(neighbours) + neighbours.pairs.start.shape[0])
     array = operator.attrgetter(name)(stepper)
-    return 0 if array is None else array.size * wp.types.type_size_in_bytes(array.dtype)
+    return 0 if array is None else _bytes(array)
+
+
+def _bytes(array: wp.array) -> int:
+    return array.size * wp.types.type_size_in_bytes(array.dtype)
 
 
 def flops_per_node_step(simulation: Simulation) -> float:
@@ -135,7 +139,7 @@ def memory_per_node(simulation: Simulation) -> float:
 def _collect_arrays(thing, found: dict[int, int], seen: set[int]) -> None:
     """Address → bytes of the arrays held by objects of warpsph and Warp's structs, however deep."""
     if isinstance(thing, wp.array):
-        found[thing.ptr] = thing.capacity
+        found[thing.ptr] = max(thing.capacity, _bytes(thing))  # a view has no capacity
     elif id(thing) not in seen:
         seen.add(id(thing))
         if isinstance(thing, (tuple, list)):
