@@ -10,32 +10,34 @@ import warp as wp
 
 from .precision import Precision
 
-WIDTHS = (8, 4, 2, 1)  # numbers in a piece
+WIDTHS = (8, 4, 2, 1)  # numbers in a piece of a row
 
 
 @cache
-def add_scaled(length: int, precision: Precision) -> wp.Function:
-    """(y, a, x) → y + a x, x and y vectors of one length."""
-    real, row, number = precision.real, precision.vec(length), f"wp::{precision.name}"
-    lines, first = [], 0
+def add_outer(rows: int, columns: int, precision: Precision) -> wp.Function:
+    """(y, a, x) → y + a ⊗ x, a row of it in as few pieces as its length allows."""
+    matrix, column, row = precision.mat(rows, columns), precision.vec(rows), precision.vec(columns)
+    number, lines, first = f"wp::{precision.name}", [], 0
     for width in WIDTHS:
         attributes = f"ext_vector_type({width}), aligned(sizeof({number})), may_alias"
-        lines.append(f"typedef {number} row_{width} __attribute__(({attributes}));")
-        while length - first >= width:
-            sum_, y, x = (f"*(row_{width}*)({name}.c + {first})" for name in ("sum", "y", "x"))
-            lines.append(f"{sum_} = {y} + a * {x};")
+        lines.append(f"typedef {number} piece_{width} __attribute__(({attributes}));")
+        while columns - first >= width:
+            pointer = f"(piece_{width}*)"
+            for r in range(rows):
+                sum_, y = (f"*{pointer}({name}.data[{r}] + {first})" for name in ("sum", "y"))
+                lines.append(f"{sum_} = {y} + a.c[{r}] * *{pointer}(x.c + {first});")
             first += width
     pieces = "\n".join(lines)
 
     @wp.func_native(f"""
         #if defined(__CUDA_ARCH__)
-        return wp::add(y, wp::mul(a, x));
+        return wp::add(y, wp::outer(a, x));
         #else
-        wp::vec_t<{length}, {number}> sum;
+        wp::mat_t<{rows}, {columns}, {number}> sum;
         {pieces}
         return sum;
         #endif
     """)
-    def add_scaled_row(y: row, a: real, x: row) -> row: ...
+    def with_outer(y: matrix, a: column, x: row) -> matrix: ...
 
-    return add_scaled_row
+    return with_outer

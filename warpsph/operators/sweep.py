@@ -18,7 +18,7 @@ import warp as wp
 from ..ground.arrays import natural, packed
 from ..ground.linear_algebra import symmetric_inverse
 from ..ground.precision import Precision
-from ..ground.rows import add_scaled
+from ..ground.rows import add_outer
 from ..ground.smoothing import SMOOTHING_FUNCTIONS
 from ..nodes.neighbours import PairList
 from ..nodes.node_sets import node_types
@@ -72,7 +72,7 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
     types = node_types(continuum, precision)
     real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
     Point, dim, length = types.Point, continuum.dim, continuum.dim + types.size
-    row, rows, add_scaled_row = precision.vec(length), precision.mat(dim, length), add_scaled(length, precision)
+    row, rows, with_outer = precision.vec(length), precision.mat(dim, length), add_outer(dim, length, precision)
     real_batch = precision.vec(batch)
     weights = SMOOTHING_FUNCTIONS[kernel](precision)
     inverse = symmetric_inverse(continuum.dim, precision)
@@ -145,10 +145,9 @@ def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = 
                 w_n, g_n = w[n] * volume[j], g[n] * volume[j]
                 grad_w = g_n * r
                 sums.w += w_n
-                sums.w_d = add_scaled_row(sums.w_d, w_n, d)
+                sums.w_d += w_n * d
                 sums.g += grad_w
-                for k in range(wp.static(dim)):
-                    sums.g_d[k] = add_scaled_row(sums.g_d[k], grad_w[k], d)
+                sums.g_d = with_outer(sums.g_d, grad_w, d)
                 n += 1
             first += count
         return sums
