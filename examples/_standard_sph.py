@@ -27,17 +27,17 @@ class StandardSPH:
     """
 
     def __init__(self, scene):
-        lattice, material = scene.lattice, scene.material
-        volume = lattice.node_volumes()[1]
+        mesh, material = scene.mesh, scene.material
+        volume = mesh.node_volumes()[1]
         self.time, self.blown = 0.0, False
-        self.x, self.v = lattice.nodes.copy(), scene.initial_velocity.copy()
+        self.x, self.v = mesh.nodes.copy(), scene.initial_velocity.copy()
         self.stress = scene.initial_stress.copy()
         self.density = np.full(len(volume), material.density)
         self._mass, self._h = material.density * volume, scene.numerics.smoothing_ratio * np.sqrt(volume.mean())
         self._lame, self._shear = material.lame_modulus, material.shear_modulus
         self._held = scene.boundary.nodes[scene.boundary.moved]
-        self._start, self._size = lattice.nodes, np.ptp(lattice.nodes, axis=0).max()
-        self._dt = COURANT * lattice.smallest_edge() / material.wave_speed(2)
+        self._start, self._size = mesh.nodes, np.ptp(mesh.nodes, axis=0).max()
+        self._dt = COURANT * mesh.smallest_edge() / material.wave_speed(2)
 
     def run(self, until, observe):
         """Advance to a time [s]; call `observe(self)` at the start and after every step; stop when it fails."""

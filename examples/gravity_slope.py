@@ -77,7 +77,7 @@ def scene(p):
 def checks(run):
     """What holds whatever the run-out: the soil keeps its area, and moves most at the toe, as in the paper."""
     simulation = run.simulation
-    area = simulation.lattice.with_nodes(simulation.field("position")).cell_volumes().sum()
+    area = simulation.mesh.with_nodes(simulation.field("position")).cell_volumes().sum()
     moved = np.linalg.norm(simulation.field("displacement"), axis=1)
     toe = moved[simulation.nearest_node(TOE)]
     return [

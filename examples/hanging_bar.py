@@ -67,7 +67,7 @@ def scene(p):
 
 def checkerboard(simulation):
     """Amplitude of the nodal checkerboard of v_y [m/s]."""
-    return checkerboard_amplitude(simulation.lattice, simulation.field("velocity")[:, 1])
+    return checkerboard_amplitude(simulation.mesh, simulation.field("velocity")[:, 1])
 
 
 def checks(run):

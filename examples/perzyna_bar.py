@@ -76,7 +76,7 @@ def scene(p):
 def checks(run):
     """RMS over all nodes but the one on the front itself, where the exact stress jumps and has no value."""
     p, simulation = run.parameters, run.simulation
-    x = LENGTH - simulation.lattice.nodes[:, 0]
+    x = LENGTH - simulation.mesh.nodes[:, 0]
     front = np.abs(x - wave_speed(p) * simulation.time) < 0.5 * p.spacing
     difference = simulation.field("stress")[:, 0] - exact_stress(x, simulation.time, p)
     scale = p.density * wave_speed(p) * p.velocity

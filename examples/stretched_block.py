@@ -62,20 +62,18 @@ def scene(p):
         numerics=p.numerics,
         output=Output(
             probes=(
-                Probe("length", "m", lambda s: length(s.lattice, s.field("position"))),
+                Probe("length", "m", lambda s: length(s.mesh, s.field("position"))),
                 Probe("smallest_distance", "m", lambda s: smallest_distance(s.field("position"))),
-                Probe(
-                    "checkerboard", "m/s", lambda s: checkerboard_amplitude(s.lattice, s.field("velocity")[:, 0])
-                ),
+                Probe("checkerboard", "m/s", lambda s: checkerboard_amplitude(s.mesh, s.field("velocity")[:, 0])),
             ),
             field="mean_stress",
         ),
     )
 
 
-def length(lattice, positions):
+def length(mesh, positions):
     """Mean distance of the right edge from the left edge [m]."""
-    left, right = (positions[edge(name).nodes(lattice), 0].mean() for name in ("left", "right"))
+    left, right = (positions[edge(name).nodes(mesh), 0].mean() for name in ("left", "right"))
     return float(right - left)
 
 
@@ -85,9 +83,9 @@ def standard_sph(run_scene, p):
 
     def observe(sph):
         columns["time"].append(sph.time)
-        columns["length"].append(length(run_scene.lattice, sph.x))
+        columns["length"].append(length(run_scene.mesh, sph.x))
         columns["smallest_distance"].append(smallest_distance(sph.x))
-        columns["checkerboard"].append(checkerboard_amplitude(run_scene.lattice, sph.v[:, 0]))
+        columns["checkerboard"].append(checkerboard_amplitude(run_scene.mesh, sph.v[:, 0]))
 
     sph = StandardSPH(run_scene)
     sph.run(p.duration, observe)

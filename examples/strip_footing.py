@@ -99,9 +99,9 @@ def scene(p):
     )
 
 
-def second_band(lattice, strain):
+def second_band(mesh, strain):
     """The curved band: where ε̄ (n,) is largest on each ray from the footing's edge, in initial positions."""
-    return trace_ridge(Sampler(lattice.nodes, lattice.cells, strain), EDGE, RAYS, NEAREST, FARTHEST, SMOOTHING)
+    return trace_ridge(Sampler(mesh.nodes, mesh.cells, strain), EDGE, RAYS, NEAREST, FARTHEST, SMOOTHING)
 
 
 def checks(run):
@@ -111,7 +111,7 @@ def checks(run):
     falls instead, towards the residual strength.
     """
     p, load, settlement = run.parameters, run.history["load"], run.history["settlement"]
-    strain = second_band(run.simulation.lattice, run.simulation.field("equivalent_plastic_strain")).strain
+    strain = second_band(run.simulation.mesh, run.simulation.field("equivalent_plastic_strain")).strain
     median = float(np.median(strain))
     reaches = Check("second_band_weakest", float(strain.min()), median, "-", bound=0.75)
     if p.hardening < 0.0:

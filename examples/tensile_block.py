@@ -69,9 +69,7 @@ def scene(p):
             probes=(
                 Probe("departure", "m", lambda s: departure(s.field("position"), p.spacing)),
                 Probe("smallest_distance", "m", lambda s: smallest_distance(s.field("position"))),
-                Probe(
-                    "checkerboard", "m/s", lambda s: checkerboard_amplitude(s.lattice, s.field("velocity")[:, 0])
-                ),
+                Probe("checkerboard", "m/s", lambda s: checkerboard_amplitude(s.mesh, s.field("velocity")[:, 0])),
             ),
             field="velocity",
         ),
@@ -91,7 +89,7 @@ def standard_sph(run_scene, p):
         columns["time"].append(sph.time)
         columns["departure"].append(departure(sph.x, p.spacing))
         columns["smallest_distance"].append(smallest_distance(sph.x))
-        columns["checkerboard"].append(checkerboard_amplitude(run_scene.lattice, sph.v[:, 0]))
+        columns["checkerboard"].append(checkerboard_amplitude(run_scene.mesh, sph.v[:, 0]))
 
     sph = StandardSPH(run_scene)
     sph.run(p.duration, observe)

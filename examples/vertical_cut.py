@@ -86,7 +86,7 @@ def scene(p):
             probes=(
                 Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node(SIZE), 1]),
                 Probe("load", "N", EdgeForce(footing, axis=1)),
-                Probe("width", "m", lambda s: width(s.lattice, s.field("position"))),
+                Probe("width", "m", lambda s: width(s.mesh, s.field("position"))),
             ),
             curve=("settlement", "load"),
             curve_reference=("exact limit load", limit_load(p)),
@@ -95,26 +95,26 @@ def scene(p):
     )
 
 
-def width(lattice, positions):
+def width(mesh, positions):
     """Width that the footing's nodes now cover [m]."""
-    x = positions[(edge("top") & where(lambda x, y: x >= SIZE[0] - WIDTH)).nodes(lattice), 0]
+    x = positions[(edge("top") & where(lambda x, y: x >= SIZE[0] - WIDTH)).nodes(mesh), 0]
     return float(x.max() - x.min())
 
 
-def band(lattice, strain):
+def band(mesh, strain):
     """The shear band, fitted to the strain ε̄ (n,) of the interior nodes where they were initially.
 
     Edge nodes are left out: ε̄ there alternates from node to node at the free edge and peaks at the footing's end.
     """
-    inside = ~edge("boundary").nodes(lattice)
-    return fit_band(lattice.nodes[inside], strain[inside])
+    inside = ~edge("boundary").nodes(mesh)
+    return fit_band(mesh.nodes[inside], strain[inside])
 
 
 def checks(run):
     p, settlement = run.parameters, run.history["settlement"]
     load = run.history["load"] * WIDTH / run.history["width"]
     strain = run.simulation.field("equivalent_plastic_strain")
-    angle = Check("band_angle", abs(band(run.simulation.lattice, strain).angle), 45.0, "°", 3.0, relative=False)
+    angle = Check("band_angle", abs(band(run.simulation.mesh, strain).angle), 45.0, "°", 3.0, relative=False)
     if p.hardening < 0.0:
         left = float(load[-1] / load.max())
         return [angle, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]

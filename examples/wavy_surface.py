@@ -101,14 +101,14 @@ def scene(p):
 
 def surface_errors(simulation, body):
     """Angles to the exact normals [degrees] at the smooth free edge, and the number of nodes misjudged."""
-    lattice = simulation.lattice
-    on_edge = np.zeros(len(lattice.nodes), dtype=bool)
-    on_edge[lattice.faces] = True
+    mesh = simulation.mesh
+    on_edge = np.zeros(len(mesh.nodes), dtype=bool)
+    on_edge[mesh.faces] = True
     moved = np.zeros(len(on_edge), dtype=bool)
     moved[simulation.scene.boundary.nodes] = simulation.scene.boundary.moved
     found = simulation.field("free_surface").astype(bool)
     misjudged = int((found != (on_edge & ~moved)).sum())
-    exact, smooth = exact_normals(body, *lattice.nodes.T)
+    exact, smooth = exact_normals(body, *mesh.nodes.T)
     chosen = on_edge & smooth & found
     cosine = np.sum(simulation.field("surface_normal")[chosen] * exact[chosen], axis=1)
     return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), misjudged

@@ -6,11 +6,11 @@ import pytest
 import warp as wp
 
 from tests.documents import LAW, ROOT, blocks, run_as_module
-from warpsph.ground.materials import LAWS
+from warpsph.materials import LAWS
 from warpsph.scene.document import types
 from warpsph.simulation.device import start_warp
 
-MAXWELL = "warpsph.ground.materials.maxwell"
+MAXWELL = "warpsph.materials.maxwell"
 
 start_warp()
 

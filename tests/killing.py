@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.test_restart import finish, resumed, slope, started
 from warpsph.simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, Interval
-from warpsph.simulation.files import write_whole
+from warpsph.storage.files import write_whole
 
 KILLS = 50
 FOREVER = None

@@ -115,12 +115,12 @@ class Energies:
     def __init__(self, simulation, every=1, observe=lambda simulation: None, bending=False):
         scene = simulation.scene
         self._every, self._also = every, observe
-        self._volume = scene.lattice.node_volumes()[0]
+        self._volume = scene.mesh.node_volumes()[0]
         self._mass = scene.material.density * self._volume
         self._compliance = compliance(scene)
-        self._cells = scene.lattice.cells if bending else np.arange(len(self._volume))[:, None]
-        self._weight = scene.lattice.cell_volumes() if bending else self._volume
-        self._force = np.zeros(scene.lattice.dim) if scene.body_force is None else scene.body_force(0.0)
+        self._cells = scene.mesh.cells if bending else np.arange(len(self._volume))[:, None]
+        self._weight = scene.mesh.cell_volumes() if bending else self._volume
+        self._force = np.zeros(scene.mesh.dim) if scene.body_force is None else scene.body_force(0.0)
         self.time, self.kinetic, self.elastic, self.potential, self.also = [], [], [], [], []
         self.sample(simulation)
 
@@ -144,7 +144,7 @@ class Energies:
 def compliance(scene):
     """Strain energy ½ σ · S σ of the stored stresses, each shear once a component; plane strain with σ33."""
     E, nu = scene.material.young_modulus, scene.material.poisson_ratio
-    pairs = scene.lattice.continuum.pairs
+    pairs = scene.mesh.continuum.pairs
     if len(pairs) == 1:
         return np.array([[1.0 / E]])
     normal = np.array([i == j for i, j in pairs])

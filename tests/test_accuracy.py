@@ -113,7 +113,7 @@ def test_hanging_bar_still_swings_after_fifty_periods():
 
     def watch(simulation):
         v, node = simulation.field("velocity")[:, 1], simulation.nearest_node(tip)
-        checkerboard = checkerboard_amplitude(simulation.lattice, v)
+        checkerboard = checkerboard_amplitude(simulation.mesh, v)
         return simulation.field("displacement")[node, 1], checkerboard, np.sqrt(np.mean(v**2))
 
     simulation = Simulation(scene, device="cpu")
@@ -230,9 +230,9 @@ def test_elastic_impact(columns, courant, bound):
     Measured 0.0268, 0.0171, 0.0119, 0.0073, and 4.2 %.
     """
     simulation, c = impact(columns, courant, 1e-4)
-    distance = np.abs(simulation.lattice.nodes[:, 0] - 0.5)
+    distance = np.abs(simulation.mesh.nodes[:, 0] - 0.5)
     v = simulation.field("velocity")[:, 0] / (1e-4 * c)
-    exact = np.where(distance < c * simulation.time, 0.0, -np.sign(simulation.lattice.nodes[:, 0] - 0.5))
+    exact = np.where(distance < c * simulation.time, 0.0, -np.sign(simulation.mesh.nodes[:, 0] - 0.5))
     assert np.abs(v - exact).mean() <= bound
     assert np.abs(v[distance < c * simulation.time - 0.05]).max() <= 0.05
     assert np.abs(v).max() <= 1.0 + 1e-3
@@ -254,7 +254,7 @@ def test_strong_impact_obeys_rankine_and_hugoniot(share, courant):
         low, high = (e, high) if -e * np.log1p(-e) < share**2 else (low, e)
     front = share / e * c * simulation.time
     exact_stress = SOFT.density * c**2 * np.log1p(-e)
-    x = simulation.lattice.nodes[:, 0] - 0.5
+    x = simulation.mesh.nodes[:, 0] - 0.5
     v, behind = simulation.field("velocity")[:, 0] / (share * c), np.abs(x) < front - 0.05
     assert np.abs(v - np.where(np.abs(x) < front, 0.0, -np.sign(x))).mean() <= 0.035
     assert np.abs(v[behind]).max() <= 0.06

@@ -18,8 +18,8 @@ from warpsph import (
     write_checkpoint,
 )
 from warpsph.export.usd import write_stage
-from warpsph.ground.materials import LAWS
-from warpsph.scene.dimension import CONTINUA
+from warpsph.materials import LAWS
+from warpsph.mesh.continuum import CONTINUA
 from warpsph.scene.document import decode, encode
 from warpsph.scene.fingerprint import fingerprint
 

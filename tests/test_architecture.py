@@ -8,7 +8,10 @@ import pytest
 import warpsph
 
 PACKAGE = Path(warpsph.__file__).parent
-ROOMS = ("errors", "scene", "ground", "nodes", "operators", "step", "simulation", "export", "cli")
+ROOMS = (
+    *("errors", "validate", "mesh", "analysis", "scene", "device", "physics", "materials", "state", "operators"),
+    *("step", "storage", "simulation", "export", "cli", "report"),
+)
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
 
 

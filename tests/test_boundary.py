@@ -1,4 +1,4 @@
-"""Conditions resolved node by node, against the rules of METHOD section 5 and of `warpsph.scene.boundary`."""
+"""Conditions resolved node by node, against the rules of METHOD section 5 and of `warpsph.scene.resolve`."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ from warpsph import (
     where,
 )
 from warpsph.scene import CONTINUA
-from warpsph.scene.boundary import resolve
+from warpsph.scene.resolve import resolve
 
 PLATE = Box((1.0, 0.5), 0.25)  # nodes at x = 0, 0.25, …, 1 and y = 0, 0.25, 0.5
 BLOCK = Box((0.5, 0.5, 0.5), 0.25)
@@ -37,12 +37,12 @@ class Resolved:
     """The resolved conditions of a shape, asked node by node."""
 
     def __init__(self, shape, *conditions):
-        self.lattice = shape.lattice()
-        self.table = resolve(self.lattice, conditions)
+        self.mesh = shape.mesh()
+        self.table = resolve(self.mesh, conditions)
 
     def row(self, *point):
-        node = np.argmin(np.linalg.norm(self.lattice.nodes - point, axis=1))
-        assert np.allclose(self.lattice.nodes[node], point)
+        node = np.argmin(np.linalg.norm(self.mesh.nodes - point, axis=1))
+        assert np.allclose(self.mesh.nodes[node], point)
         return self.table.nodes.tolist().index(node)
 
     def freedom(self, *point):
@@ -55,7 +55,7 @@ class Resolved:
 
     def kept(self, *point):
         """The stored stress components that remain of 1, 2, 4, … at a node."""
-        remains = self.table.stress_projector[self.row(*point)] @ STRESS[self.lattice.dim]
+        remains = self.table.stress_projector[self.row(*point)] @ STRESS[self.mesh.dim]
         return remains.tolist()
 
 
@@ -107,26 +107,26 @@ SCENES = {
 
 @pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
 def test_projectors_are_orthogonal_projectors_and_drives_lie_across_them(shape, conditions):
-    lattice = shape.lattice()
-    table = resolve(lattice, conditions)
+    mesh = shape.mesh()
+    table = resolve(mesh, conditions)
     freedom, stress = table.velocity_projector, table.stress_projector
-    weight = np.sqrt([1.0 if i == j else 2.0 for i, j in lattice.continuum.pairs])
+    weight = np.sqrt([1.0 if i == j else 2.0 for i, j in mesh.continuum.pairs])
     frobenius = stress * weight[:, None] / weight
     for matrix in (freedom, frobenius):
         assert np.allclose(matrix @ matrix, matrix, atol=1e-12)
         assert np.allclose(matrix, matrix.swapaxes(1, 2), atol=1e-12)
     assert np.allclose(np.einsum("bij,bkj->bki", freedom, table.amplitude), 0.0, atol=1e-12)
-    assert np.array_equal(table.moved, np.trace(freedom, axis1=1, axis2=2) < lattice.dim - 0.5)
+    assert np.array_equal(table.moved, np.trace(freedom, axis1=1, axis2=2) < mesh.dim - 0.5)
 
 
 def test_table_holds_the_selected_nodes_and_no_others():
     resolved = Resolved(PLATE, Fixed(edge("left")), Free(edge("top")))
-    selected = edge("left").nodes(resolved.lattice) | edge("top").nodes(resolved.lattice)
+    selected = edge("left").nodes(resolved.mesh) | edge("top").nodes(resolved.mesh)
     assert resolved.table.nodes.tolist() == np.flatnonzero(selected).tolist()
 
 
 def test_no_condition_constrains_no_node():
-    table = resolve(PLATE.lattice(), ())
+    table = resolve(PLATE.mesh(), ())
     assert len(table.nodes) == 0 and table.functions == ()
 
 
@@ -239,8 +239,8 @@ def test_velocity_beats_the_zero_traction_of_another_velocity_condition():
 
 
 def test_zero_normal_velocity_is_a_roller():
-    roller = resolve(PLATE.lattice(), [Roller(edge("top"))])
-    moved = resolve(PLATE.lattice(), [PrescribedVelocity(edge("top"), (None, 0.0))])
+    roller = resolve(PLATE.mesh(), [Roller(edge("top"))])
+    moved = resolve(PLATE.mesh(), [PrescribedVelocity(edge("top"), (None, 0.0))])
     assert np.array_equal(roller.velocity_projector, moved.velocity_projector)
     assert np.array_equal(roller.stress_projector, moved.stress_projector)
 
@@ -300,8 +300,8 @@ def test_oblique_free_edge_has_no_traction():
 def test_normals_of_a_curved_edge_are_means_of_the_faces_beside_the_node():
     """On a circle of equal faces the mean of two neighbouring face normals points along the radius."""
     ring = Box((1.0, 1.0), 0.125).mapped(lambda x, y: ((1 + x) * np.cos(1.5 * y), (1 + x) * np.sin(1.5 * y)))
-    table = resolve(ring.lattice(), [Roller(edge("right") & where(lambda x, y: (y > 0) & (y < 2 * np.sin(1.4))))])
-    radial = ring.lattice().nodes[table.nodes] / 2.0
+    table = resolve(ring.mesh(), [Roller(edge("right") & where(lambda x, y: (y > 0) & (y < 2 * np.sin(1.4))))])
+    radial = ring.mesh().nodes[table.nodes] / 2.0
     assert len(radial) == 7
     expected = np.eye(2) - radial[:, :, None] * radial[:, None, :]
     assert np.allclose(table.velocity_projector, expected, atol=1e-11)
@@ -316,9 +316,9 @@ def test_turned_box_gives_the_turned_result(shape, conditions):
     angle = 0.7
     turn = np.eye(3)
     turn[:2, :2] = np.transpose([turned(angle, 1, 0), turned(angle, 0, 1)])
-    straight = resolve(shape.lattice(), conditions)
-    oblique = resolve(shape.rotated(angle, about=(2.0, 1.0)).lattice(), conditions)
-    continuum = shape.lattice().continuum
+    straight = resolve(shape.mesh(), conditions)
+    oblique = resolve(shape.rotated(angle, about=(2.0, 1.0)).mesh(), conditions)
+    continuum = shape.mesh().continuum
     small, basis = turn[: continuum.dim, : continuum.dim], np.eye(continuum.stress_size)
     assert np.array_equal(straight.nodes, oblique.nodes)
     assert np.allclose(oblique.velocity_projector, small @ straight.velocity_projector @ small.T, atol=1e-11)
@@ -333,12 +333,12 @@ def test_turned_box_gives_the_turned_result(shape, conditions):
 @pytest.mark.parametrize("shape", [PLATE, BLOCK])
 def test_rotating_nodes_have_the_velocity_of_a_rigid_rotation(shape, t):
     rate, centre = -1.7, np.array([0.3, -0.2])
-    lattice = shape.lattice()
-    table = resolve(lattice, [Rotating(edge("right"), rate, tuple(centre))])
-    arm = lattice.nodes[table.nodes, :2] - centre
+    mesh = shape.mesh()
+    table = resolve(mesh, [Rotating(edge("right"), rate, tuple(centre))])
+    arm = mesh.nodes[table.nodes, :2] - centre
     c, s = math.cos(rate * t), math.sin(rate * t)
     arm = arm @ np.array([[c, s], [-s, c]])
-    expected = np.zeros((len(arm), lattice.dim))
+    expected = np.zeros((len(arm), mesh.dim))
     expected[:, 0], expected[:, 1] = -rate * arm[:, 1], rate * arm[:, 0]
     assert np.allclose(drives(table, t), expected, rtol=0.0, atol=1e-13)
     assert not table.velocity_projector.any()
@@ -356,7 +356,7 @@ def test_equal_functions_are_evaluated_once():
         PrescribedVelocity(edge("left"), (Linear(2.0), 0.0)),
         PrescribedVelocity(edge("right"), (Linear(2.0), 3.0)),
     ]
-    assert resolve(PLATE.lattice(), conditions).functions == (Linear(2.0), 3.0, 0.0)
+    assert resolve(PLATE.mesh(), conditions).functions == (Linear(2.0), 3.0, 0.0)
 
 
 def test_drive_that_is_nan_stays_at_its_own_nodes():
@@ -400,7 +400,7 @@ LEFT, CORE = edge("left"), region((0.25, 0.25), (0.75, 0.25))
 def test_two_velocities_in_one_direction_are_refused(conditions):
     for order in itertools.permutations(conditions):
         with pytest.raises(SceneError, match=r"conditions\[0\].*conditions\[1\].*different velocities"):
-            resolve(PLATE.lattice(), order)
+            resolve(PLATE.mesh(), order)
 
 
 @pytest.mark.parametrize(
@@ -415,14 +415,14 @@ def test_two_velocities_in_one_direction_are_refused(conditions):
 def test_free_and_moved_face_is_refused(moved):
     for order in itertools.permutations([moved, Free(edge("top") & where(lambda x, y: x >= 0.5))]):
         with pytest.raises(SceneError, match=r"shares 2 boundary face\(s\).*either free or moved"):
-            resolve(PLATE.lattice(), order)
+            resolve(PLATE.mesh(), order)
 
 
 @pytest.mark.parametrize("condition", [Roller, Free])
 def test_normal_of_an_inner_node_must_be_given(condition):
     with pytest.raises(SceneError, match=r"node 4 at \(0\.25, 0\.25\) lies on no selected boundary face"):
-        resolve(PLATE.lattice(), [condition(CORE)])
-    assert len(resolve(PLATE.lattice(), [condition(CORE, normal=(0.0, 1.0))]).nodes) == 3
+        resolve(PLATE.mesh(), [condition(CORE)])
+    assert len(resolve(PLATE.mesh(), [condition(CORE, normal=(0.0, 1.0))]).nodes) == 3
 
 
 # ---------------------------------------------------------------------------------------------------------
@@ -437,8 +437,8 @@ TILTED = {
 
 
 def unloading(shape, conditions, material=ROCK):
-    lattice = shape.lattice()
-    return resolve(lattice, conditions, material.stiffness(lattice.continuum))
+    mesh = shape.mesh()
+    return resolve(mesh, conditions, material.stiffness(mesh.continuum))
 
 
 def energies(a, b, material=ROCK):
@@ -451,7 +451,7 @@ def energies(a, b, material=ROCK):
 @pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
 def test_unloading_is_a_projector_orthogonal_in_the_elastic_energy(shape, conditions):
     """What is taken away does no work on what is left, of any two stresses, and nothing is taken away twice."""
-    table, continuum = unloading(shape, conditions), shape.lattice().continuum
+    table, continuum = unloading(shape, conditions), shape.mesh().continuum
     for projector in table.stress_projector:
         assert np.allclose(projector @ projector, projector, atol=1e-12)
         kept, taken = tensor(projector.T, continuum), tensor((np.eye(len(projector)) - projector).T, continuum)
@@ -461,7 +461,7 @@ def test_unloading_is_a_projector_orthogonal_in_the_elastic_energy(shape, condit
 @pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
 def test_unloading_and_cutting_off_leave_the_same_tractions_zero(shape, conditions):
     """Each keeps what the other leaves. All else is as it is: nodes, velocities and what moves them."""
-    unloaded, cut = unloading(shape, conditions), resolve(shape.lattice(), conditions)
+    unloaded, cut = unloading(shape, conditions), resolve(shape.mesh(), conditions)
     a, b = unloaded.stress_projector, cut.stress_projector
     assert np.allclose(a @ b, b, atol=1e-12) and np.allclose(b @ a, a, atol=1e-12)
     for name in ("nodes", "velocity_projector", "amplitude", "function", "moved"):
@@ -471,7 +471,7 @@ def test_unloading_and_cutting_off_leave_the_same_tractions_zero(shape, conditio
 @pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
 def test_without_poisson_s_effect_unloading_is_cutting_off(shape, conditions):
     cork = Elastic(young_modulus=5.0, poisson_ratio=0.0, density=1.0)
-    unloaded, cut = unloading(shape, conditions, cork), resolve(shape.lattice(), conditions)
+    unloaded, cut = unloading(shape, conditions, cork), resolve(shape.mesh(), conditions)
     assert np.allclose(unloaded.stress_projector, cut.stress_projector, atol=1e-12)
 
 
@@ -502,7 +502,7 @@ def test_unloading_at_the_end_of_a_wall_leaves_the_wall_its_pressure():
     """Roller left, free top: σ22 and the shear go; the wall's σ11 changes elastically, it does not go."""
     conditions = (Roller(edge("left")), Free(edge("top")))
     table = unloading(PLATE, conditions)
-    node = np.flatnonzero(np.isclose(PLATE.lattice().nodes, (0.0, 0.5)).all(axis=1))[0]
+    node = np.flatnonzero(np.isclose(PLATE.mesh().nodes, (0.0, 0.5)).all(axis=1))[0]
     stress = tensor(table.stress_projector[table.nodes.tolist().index(node)] @ STRESS[2], CONTINUA[2])
     x, y = np.eye(2)
     start = tensor(np.array(STRESS[2]), CONTINUA[2])
@@ -524,4 +524,4 @@ def test_an_edge_without_a_condition_is_free_where_tractions_are_released():
     for name in ("nodes", "stress_projector", "velocity_projector"):
         assert np.allclose(getattr(bare.boundary, name), getattr(named.boundary, name), atol=1e-12)
     published = Scene(**common, numerics=Numerics(velocity_scheme="taylor"))
-    assert published.boundary.nodes.tolist() == resolve(PLATE.lattice(), common["conditions"]).nodes.tolist()
+    assert published.boundary.nodes.tolist() == resolve(PLATE.mesh(), common["conditions"]).nodes.tolist()

@@ -39,7 +39,7 @@ def move(simulation, dt):
 
 def moved(simulation, F):
     """Moved by x → F x in four unequal steps of the cells' motion."""
-    reference = simulation.lattice.nodes
+    reference = simulation.mesh.nodes
     there, done = reference @ F.T, 0.0
     for part in (0.1, 0.4, 0.3, 0.2):
         dt = 0.5
@@ -69,11 +69,11 @@ def test_densities_are_exact_in_a_homogeneous_motion(device, precision, dim, nam
     weight = simulation.nodes.weight.numpy()
     moved(simulation, F)
     ratio, tolerance = np.linalg.det(F), 10 * ROUNDING[precision]
-    np.testing.assert_allclose(simulation.field("position"), simulation.lattice.nodes @ F.T, atol=tolerance)
+    np.testing.assert_allclose(simulation.field("position"), simulation.mesh.nodes @ F.T, atol=tolerance)
     np.testing.assert_allclose(simulation.field("density"), SOFT.density / ratio, rtol=tolerance)
     np.testing.assert_allclose(simulation.auxiliary.density.numpy(), SOFT.density / ratio, rtol=tolerance)
     volume = simulation.auxiliary.volume.numpy()
-    np.testing.assert_allclose(volume, simulation.lattice.cell_volumes() * ratio, rtol=tolerance)
+    np.testing.assert_allclose(volume, simulation.mesh.cell_volumes() * ratio, rtol=tolerance)
     held = simulation.nodes.volume.numpy() * simulation.field("density")
     np.testing.assert_allclose(held, weight, rtol=tolerance)
     np.testing.assert_array_equal(simulation.field("mass"), mass)
@@ -104,15 +104,15 @@ def mean_edges(corners):
 def edges_of(simulation):
     """Of every cell where the nodes are now, shape (m, d, d)."""
     position = simulation.field("position").astype(float)
-    return np.array([mean_edges(corners) for corners in position[simulation.lattice.cells]])
+    return np.array([mean_edges(corners) for corners in position[simulation.mesh.cells]])
 
 
 def missed_neighbours(simulation):
     """How many nodes, and cells, within a stretched support the pair lists do not hold."""
-    lattice, numerics, stepper = simulation.lattice, simulation.scene.numerics, simulation._stepper
+    mesh, numerics, stepper = simulation.mesh, simulation.scene.numerics, simulation._stepper
     reach = 0.999 * KERNELS[numerics.kernel].support * numerics.smoothing_ratio
     frames = np.linalg.inv(edges_of(simulation))
-    of_nodes = [frames[(lattice.cells == i).any(axis=1)].mean(axis=0) for i in range(len(lattice.nodes))]
+    of_nodes = [frames[(mesh.cells == i).any(axis=1)].mean(axis=0) for i in range(len(mesh.nodes))]
     nodes, cells = (part.point.numpy()["x"].astype(float) for part in (simulation.nodes, simulation.auxiliary))
     missed = 0
     for pairs, targets, sources, metrics in (
@@ -196,7 +196,7 @@ def test_spacing_is_the_least_singular_value_of_the_edges_times_the_root_of_the_
     shrinkage_after(simulation, MOTIONS[name](dim))
     spacing = 1.0 / simulation._stepper._motion._spacing._rate.numpy()
     edges = edges_of(simulation)
-    density = SOFT.density * simulation.lattice.cell_volumes() / np.abs(np.linalg.det(edges))
+    density = SOFT.density * simulation.mesh.cell_volumes() / np.abs(np.linalg.det(edges))
     error = spacing / (np.linalg.svd(edges, compute_uv=False).min(axis=1) * np.sqrt(density)) - 1.0
     assert error.min() >= -100 * ROUNDING[precision]
     assert error.max() <= 0.003

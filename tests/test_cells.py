@@ -9,38 +9,38 @@ import pytest
 import warp as wp
 
 from warpsph import Box
-from warpsph.ground.precision import PRECISIONS
-from warpsph.nodes.node_sets import node_types
-from warpsph.operators.cells import cell_types
-from warpsph.operators.shock import ROUGH, front_pressure
-from warpsph.operators.sweep import sweep
+from warpsph.device.precision import PRECISIONS
+from warpsph.operators.cell_means import cell_types
+from warpsph.operators.front import ROUGH, front_pressure
+from warpsph.operators.neighbour_sums import sweep
 from warpsph.scene import CONTINUA
+from warpsph.state.nodes import node_types
 
 DIMENSIONS = [1, 2, 3]
 ROUNDING = {"float64": 1e-13, "float32": 1e-4}
 CELLS = (4, 3, 3)
 
 
-def index_of(lattice):
+def index_of(mesh):
     """Integer coordinates of the nodes of the unmapped box, shape (n, d)."""
-    return np.round(lattice.nodes).astype(int)
+    return np.round(mesh.nodes).astype(int)
 
 
 def box(dim):
-    return Box(tuple(float(c) for c in CELLS[:dim]), 1.0).lattice()
+    return Box(tuple(float(c) for c in CELLS[:dim]), 1.0).mesh()
 
 
-def distorted(lattice):
+def distorted(mesh):
     """No cell is a parallelogram any more."""
-    shift = np.random.default_rng(8).uniform(-0.15, 0.15, size=lattice.nodes.shape)
-    return lattice.with_nodes(lattice.nodes + shift)
+    shift = np.random.default_rng(8).uniform(-0.15, 0.15, size=mesh.nodes.shape)
+    return mesh.with_nodes(mesh.nodes + shift)
 
 
-def sheared(lattice):
+def sheared(mesh):
     """All cells are parallelepipeds; returns the lattice and F."""
-    dim = lattice.nodes.shape[1]
+    dim = mesh.nodes.shape[1]
     F = np.eye(dim) + np.random.default_rng(9).uniform(-0.25, 0.25, size=(dim, dim))
-    return lattice.with_nodes(lattice.nodes @ F.T), F
+    return mesh.with_nodes(mesh.nodes @ F.T), F
 
 
 @dataclass
@@ -96,18 +96,18 @@ def probes(dim, precision):
     return describe_all, gather_all, types, cell_of
 
 
-def see(lattice, field, precision, middle_gradient=None, share=1.0):
+def see(mesh, field, precision, middle_gradient=None, share=1.0):
     """Run both on node values (n, d + s) and gradients in the middle of the cells (m, d + s, d)."""
-    describe_all, gather_all, types, cell_of = probes(lattice.dim, precision)
+    describe_all, gather_all, types, cell_of = probes(mesh.dim, precision)
     phi, phi_gradient, Point = types.phi, types.phi_gradient, types.Point
-    n, m = len(lattice.nodes), len(lattice.cells)
+    n, m = len(mesh.nodes), len(mesh.cells)
     points = np.zeros(n, dtype=Point.numpy_dtype())
-    points["x"], points["phi"] = lattice.nodes, field
-    auxiliary, cells = types.AuxiliaryNodes(), cell_of.new(lattice, "cpu")
+    points["x"], points["phi"] = mesh.nodes, field
+    auxiliary, cells = types.AuxiliaryNodes(), cell_of.new(mesh, "cpu")
     auxiliary.point = wp.zeros(m, dtype=Point, device="cpu")
-    auxiliary.cell = wp.array(lattice.cells, dtype=wp.int32, device="cpu")
+    auxiliary.cell = wp.array(mesh.cells, dtype=wp.int32, device="cpu")
     if middle_gradient is None:
-        middle_gradient = np.zeros((m, types.size, lattice.dim))
+        middle_gradient = np.zeros((m, types.size, mesh.dim))
     gradients = wp.array(middle_gradient, dtype=phi_gradient, device="cpu")
     wp.launch(
         describe_all, m, [wp.array(points, dtype=Point, device="cpu"), gradients, auxiliary, cells], device="cpu"
@@ -115,7 +115,7 @@ def see(lattice, field, precision, middle_gradient=None, share=1.0):
     written = (phi, phi_gradient, phi, types.tensor)
     outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
     wp.launch(gather_all, n, [auxiliary, cells, share], outputs, device="cpu")
-    gradient, frame = types.size * lattice.dim, lattice.dim**2
+    gradient, frame = types.size * mesh.dim, mesh.dim**2
     modes = cells.numbers.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
 
@@ -124,24 +124,24 @@ def size_of(dim):
     return dim + CONTINUA[dim].stress_size
 
 
-def mean_over_cells(lattice, of_cells):
+def mean_over_cells(mesh, of_cells):
     """Of each node, over the cells it is a corner of."""
-    return np.array([of_cells[(lattice.cells == i).any(axis=1)].mean(axis=0) for i in range(len(lattice.nodes))])
+    return np.array([of_cells[(mesh.cells == i).any(axis=1)].mean(axis=0) for i in range(len(mesh.nodes))])
 
 
 @pytest.mark.parametrize("dim", DIMENSIONS)
 def test_a_linear_field_on_distorted_cells_is_exact_and_has_no_modes(precision, dim):
     rng = np.random.default_rng(1)
     slope, constant = rng.normal(size=(size_of(dim), dim)), rng.normal(size=size_of(dim))
-    lattice = distorted(box(dim))
-    middle = lattice.nodes[lattice.cells].mean(axis=1)
+    mesh = distorted(box(dim))
+    middle = mesh.nodes[mesh.cells].mean(axis=1)
     given = np.tile(slope, (len(middle), 1, 1))
-    seen = see(lattice, lattice.nodes @ slope.T + constant, precision, given)
+    seen = see(mesh, mesh.nodes @ slope.T + constant, precision, given)
     close = {"rtol": 0.0, "atol": 10 * ROUNDING[precision]}
     np.testing.assert_allclose(seen.mean, middle @ slope.T + constant, **close)
     np.testing.assert_allclose(seen.modes, 0.0, **close)
-    np.testing.assert_allclose(seen.value, mean_over_cells(lattice, middle) @ slope.T + constant, **close)
-    np.testing.assert_allclose(seen.gradient, np.tile(slope, (len(lattice.nodes), 1, 1)), **close)
+    np.testing.assert_allclose(seen.value, mean_over_cells(mesh, middle) @ slope.T + constant, **close)
+    np.testing.assert_allclose(seen.gradient, np.tile(slope, (len(mesh.nodes), 1, 1)), **close)
     np.testing.assert_allclose(seen.checkerboard, 0.0, **close)
 
 
@@ -153,7 +153,7 @@ def test_gradient_of_a_multilinear_field_is_exact_on_the_way_to_the_corner(preci
     The velocity's, that is; of the stress the gradient in the middle is asked for.
     """
     rng = np.random.default_rng(2)
-    lattice, F = sheared(box(dim))
+    mesh, F = sheared(box(dim))
     products = [s for size in range(1, dim + 1) for s in itertools.combinations(range(dim), size)]
     weights = rng.normal(size=(size_of(dim), len(products)))
 
@@ -169,10 +169,10 @@ def test_gradient_of_a_multilinear_field_is_exact_on_the_way_to_the_corner(preci
                 by_xi[:, k, a] = xi[:, [b for b in s if b != a]].prod(axis=1)
         return np.einsum("kp,npa,aj->nkj", weights, by_xi, np.linalg.inv(F))
 
-    middle = lattice.nodes[lattice.cells].mean(axis=1)
-    seen = see(lattice, field(lattice.nodes), precision, gradient(middle), share)
-    for i, x in enumerate(lattice.nodes):
-        own = middle[(lattice.cells == i).any(axis=1)]
+    middle = mesh.nodes[mesh.cells].mean(axis=1)
+    seen = see(mesh, field(mesh.nodes), precision, gradient(middle), share)
+    for i, x in enumerate(mesh.nodes):
+        own = middle[(mesh.cells == i).any(axis=1)]
         expected = gradient(own).mean(axis=0)
         expected[:dim] = gradient(own + share * (x - own)).mean(axis=0)[:dim]
         np.testing.assert_allclose(seen.gradient[i], expected, rtol=0.0, atol=1e3 * ROUNDING[precision])
@@ -185,10 +185,10 @@ def test_a_checkerboard_is_seen_with_its_amplitude(precision, dim, axes):
     On distorted cells too, edges and corners included: no cell's shape has a say in it.
     """
     plain, rng = box(dim), np.random.default_rng(3)
-    lattice = distorted(plain)
+    mesh = distorted(plain)
     sign = (-1.0) ** index_of(plain)[:, axes].sum(axis=1)
     amplitude, slope = rng.normal(size=size_of(dim)), rng.normal(size=(size_of(dim), dim))
-    seen = see(lattice, sign[:, None] * amplitude + lattice.nodes @ slope.T, precision)
+    seen = see(mesh, sign[:, None] * amplitude + mesh.nodes @ slope.T, precision)
     close = {"rtol": 0.0, "atol": 10 * ROUNDING[precision]}
     np.testing.assert_allclose(seen.checkerboard, sign[:, None] * amplitude, **close)
 
@@ -197,30 +197,30 @@ def test_a_checkerboard_is_seen_with_its_amplitude(precision, dim, axes):
 def test_a_field_that_varies_along_one_axis_is_no_checkerboard(precision, dim):
     """Not even where it alternates, as the stress does across a free edge, and all that a bar can have."""
     rng = np.random.default_rng(4)
-    lattice = box(dim)
+    mesh = box(dim)
     for axis in range(dim):
         profile = rng.normal(size=(CELLS[axis] + 1, size_of(dim)))
-        seen = see(lattice, profile[index_of(lattice)[:, axis]], precision)
+        seen = see(mesh, profile[index_of(mesh)[:, axis]], precision)
         np.testing.assert_allclose(seen.checkerboard, 0.0, rtol=0.0, atol=10 * ROUNDING[precision])
         np.testing.assert_allclose(seen.gradient, 0.0, rtol=0.0, atol=10 * ROUNDING[precision])
 
 
 def test_taking_the_checkerboard_off_keeps_the_sum():
     """Σ m f on a lattice, m the number of a node's cells, for any field at all."""
-    lattice = box(3)
-    field = np.random.default_rng(5).normal(size=(len(lattice.nodes), size_of(3)))
-    cells = np.bincount(lattice.cells.ravel())
-    lost = cells @ see(lattice, field, "float64").checkerboard
+    mesh = box(3)
+    field = np.random.default_rng(5).normal(size=(len(mesh.nodes), size_of(3)))
+    cells = np.bincount(mesh.cells.ravel())
+    lost = cells @ see(mesh, field, "float64").checkerboard
     np.testing.assert_allclose(lost, 0.0, atol=1e-12)
 
 
 def test_a_folded_cell_has_no_frame():
     """A corner pushed through the opposite one: modes are finite, the gradient is that of the middle."""
-    lattice = Box((1.0, 1.0), 1.0).lattice()
-    nodes = lattice.nodes.copy()
+    mesh = Box((1.0, 1.0), 1.0).mesh()
+    nodes = mesh.nodes.copy()
     nodes[3] = (-1.5, -1.5)
     field, given = np.arange(24.0).reshape(4, 6), np.ones((1, 6, 2))
-    seen = see(lattice.with_nodes(nodes), field, "float64", given)
+    seen = see(mesh.with_nodes(nodes), field, "float64", given)
     np.testing.assert_allclose(seen.gradient, 1.0)
     np.testing.assert_allclose(seen.modes[0, :, 0], field.T @ [0.25, -0.25, -0.25, 0.25])
     np.testing.assert_array_equal(seen.frame, 0.0)
@@ -237,13 +237,13 @@ def mean_edges(corners):
 def test_the_frame_of_a_node_is_the_mean_of_its_cells(precision, dim):
     """∇ξ of a parallelepiped is the inverse of its edges, all over a sheared lattice; of others the mean."""
     tolerance = 10 * ROUNDING[precision]
-    lattice, F = sheared(box(dim))
-    seen = see(lattice, np.zeros((len(lattice.nodes), size_of(dim))), precision)
-    np.testing.assert_allclose(seen.frame, np.tile(np.linalg.inv(F), (len(lattice.nodes), 1, 1)), atol=tolerance)
-    lattice = distorted(box(dim))
-    seen = see(lattice, np.zeros((len(lattice.nodes), size_of(dim))), precision)
-    frames = np.array([np.linalg.inv(mean_edges(corners)) for corners in lattice.nodes[lattice.cells]])
-    np.testing.assert_allclose(seen.frame, mean_over_cells(lattice, frames), atol=tolerance)
+    mesh, F = sheared(box(dim))
+    seen = see(mesh, np.zeros((len(mesh.nodes), size_of(dim))), precision)
+    np.testing.assert_allclose(seen.frame, np.tile(np.linalg.inv(F), (len(mesh.nodes), 1, 1)), atol=tolerance)
+    mesh = distorted(box(dim))
+    seen = see(mesh, np.zeros((len(mesh.nodes), size_of(dim))), precision)
+    frames = np.array([np.linalg.inv(mean_edges(corners)) for corners in mesh.nodes[mesh.cells]])
+    np.testing.assert_allclose(seen.frame, mean_over_cells(mesh, frames), atol=tolerance)
 
 
 @pytest.mark.parametrize("dim", DIMENSIONS)
@@ -296,15 +296,15 @@ def pressure_probe(dim, precision):
     return probe, types, scalar
 
 
-def pressures(lattice, gradients, rates, precision, strength=0.75, dt=0.1, density=3.0):
+def pressures(mesh, gradients, rates, precision, strength=0.75, dt=0.1, density=3.0):
     """q of each cell for node values of L (n, d, d) and tr L in the middle of the cells (m,)."""
-    probe, types, scalar = pressure_probe(lattice.dim, precision)
-    points = np.zeros(len(lattice.nodes), dtype=types.Point.numpy_dtype())
-    points["x"] = lattice.nodes
-    auxiliary, nodes, m = types.AuxiliaryNodes(), types.MaterialNodes(), len(lattice.cells)
+    probe, types, scalar = pressure_probe(mesh.dim, precision)
+    points = np.zeros(len(mesh.nodes), dtype=types.Point.numpy_dtype())
+    points["x"] = mesh.nodes
+    auxiliary, nodes, m = types.AuxiliaryNodes(), types.MaterialNodes(), len(mesh.cells)
     nodes.point = wp.array(points, dtype=types.Point, device="cpu")
     nodes.velocity_gradient = wp.array(gradients, dtype=types.tensor, device="cpu")
-    auxiliary.cell = wp.array(lattice.cells, dtype=wp.int32, device="cpu")
+    auxiliary.cell = wp.array(mesh.cells, dtype=wp.int32, device="cpu")
     auxiliary.density = wp.full(m, density, dtype=scalar, device="cpu")
     out = wp.full(m, np.nan, dtype=scalar, device="cpu")
     inputs = [auxiliary, nodes, wp.array(rates, dtype=scalar, device="cpu"), strength, dt]
@@ -315,18 +315,16 @@ def pressures(lattice, gradients, rates, precision, strength=0.75, dt=0.1, densi
 @pytest.mark.parametrize("dim", DIMENSIONS)
 def test_no_pressure_in_a_linear_field_of_rates_nor_in_shear_nor_at_rest(precision, dim):
     """Of tr L, linear in the position, on distorted cells; of a jump in shear; of nothing at all."""
-    lattice, rng = distorted(box(dim)), np.random.default_rng(6)
-    n, m, slope = len(lattice.nodes), len(lattice.cells), rng.normal(size=dim)
-    gradients = np.eye(dim) * ((1.0 + lattice.nodes @ slope) / dim)[:, None, None]
-    rates = 1.0 + lattice.nodes[lattice.cells].mean(axis=1) @ slope
-    assert (
-        np.abs(pressures(lattice, gradients, rates, precision)).max() <= ROUNDING[precision] ** 2 / ROUGH**2 * 1e2
-    )
+    mesh, rng = distorted(box(dim)), np.random.default_rng(6)
+    n, m, slope = len(mesh.nodes), len(mesh.cells), rng.normal(size=dim)
+    gradients = np.eye(dim) * ((1.0 + mesh.nodes @ slope) / dim)[:, None, None]
+    rates = 1.0 + mesh.nodes[mesh.cells].mean(axis=1) @ slope
+    assert np.abs(pressures(mesh, gradients, rates, precision)).max() <= ROUNDING[precision] ** 2 / ROUGH**2 * 1e2
     if dim > 1:
         jump = np.zeros((n, dim, dim))
         jump[: n // 2, 0, 1] = 5.0
-        assert not pressures(lattice, jump, np.zeros(m), precision).any()
-    assert not pressures(lattice, np.zeros((n, dim, dim)), np.zeros(m), precision).any()
+        assert not pressures(mesh, jump, np.zeros(m), precision).any()
+    assert not pressures(mesh, np.zeros((n, dim, dim)), np.zeros(m), precision).any()
 
 
 @pytest.mark.parametrize("rate", [-2.0, 2.0])
@@ -335,12 +333,10 @@ def test_pressure_at_a_jump_is_rho_nu_e_with_the_least_thickness(precision, dim,
     """Cells of 1 × 0.5 × 2: Δ is the least of them. It resists, and grows with the square of a small roughness."""
     stretch = np.array([1.0, 0.5, 2.0])[:dim]
     plain = box(dim)
-    lattice = plain.with_nodes(plain.nodes * stretch)
-    still, rates = np.zeros((len(lattice.nodes), dim, dim)), np.full(len(lattice.cells), rate)
+    mesh = plain.with_nodes(plain.nodes * stretch)
+    still, rates = np.zeros((len(mesh.nodes), dim, dim)), np.full(len(mesh.cells), rate)
     full = 3.0 * 0.75 * stretch.min() ** 2 / (4.0 * 0.1) * rate
-    np.testing.assert_allclose(pressures(lattice, still, rates, precision), full, rtol=ROUNDING[precision])
-    smooth = np.tile(0.9 * rate / dim * np.eye(dim), (len(lattice.nodes), 1, 1))
+    np.testing.assert_allclose(pressures(mesh, still, rates, precision), full, rtol=ROUNDING[precision])
+    smooth = np.tile(0.9 * rate / dim * np.eye(dim), (len(mesh.nodes), 1, 1))
     expected = full * (0.1 / ROUGH) ** 2
-    np.testing.assert_allclose(
-        pressures(lattice, smooth, rates, precision), expected, rtol=10 * ROUNDING[precision]
-    )
+    np.testing.assert_allclose(pressures(mesh, smooth, rates, precision), expected, rtol=10 * ROUNDING[precision])

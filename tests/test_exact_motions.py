@@ -40,7 +40,7 @@ def test_free_fall_is_exact(device, precision, dim, scheme):
     steps = 50
     for _ in range(steps):
         simulation.step()
-    t, n, tolerance = simulation.time, len(scene.lattice.nodes), 4 * steps * EPS[precision]
+    t, n, tolerance = simulation.time, len(scene.mesh.nodes), 4 * steps * EPS[precision]
     np.testing.assert_allclose(simulation.field("velocity"), np.tile(g * t, (n, 1)), rtol=tolerance)
     np.testing.assert_allclose(simulation.field("displacement"), np.tile(g * t**2 / 2, (n, 1)), rtol=tolerance)
     # Each step may add the modulus times Δt times the rounding of ∇v, a few eps |v|/Δx.
@@ -93,8 +93,8 @@ def test_uniform_stretch_has_its_closed_form(device, dim):
     """
     rate, end, cells = 20.0, 0.005, 8
     shape = Box((1.0,) * dim, 1.0 / cells)
-    lattice = shape.lattice()
-    boundary = lattice.nodes[edge("boundary").nodes(lattice)]
+    mesh = shape.mesh()
+    boundary = mesh.nodes[edge("boundary").nodes(mesh)]
     scene = Scene(
         shape=shape,
         material=SOFT,

@@ -88,7 +88,7 @@ def test_softening_footing_s_second_band_comes_out_beside_the_footing():
     scene, _ = file.build(["hardening=-1e6"])
     simulation = Simulation(scene, device="cpu")
     simulation.run()
-    ridge = file.module.second_band(scene.lattice, simulation.field("equivalent_plastic_strain"))
+    ridge = file.module.second_band(scene.mesh, simulation.field("equivalent_plastic_strain"))
     assert ridge.strain.min() > 0.25 * np.median(ridge.strain) > 0.0
     assert ridge.points[-1, 1] == pytest.approx(3.0) and 2.0 < ridge.points[-1, 0] < 4.0
     assert ridge.points[:, 1].min() < 2.0

@@ -32,7 +32,7 @@ from warpsph import (
 )
 from warpsph.cli.main import main
 from warpsph.simulation.checkpoint import Checkpoint, Checkpoints, Interval, write_checkpoint
-from warpsph.simulation.files import write_whole
+from warpsph.storage.files import write_whole
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1  # of Linux
 NO_RIGHT = 77

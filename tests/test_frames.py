@@ -84,7 +84,7 @@ def test_frames_are_the_first_steps_at_or_after_their_times(tmp_path, precision)
             scale = np.abs(fields[name]).max() or 1.0
             np.testing.assert_allclose(frame.field(name), fields[name], atol=4e-7 * scale, err_msg=name)
     for name in ("nodes", "cells", "faces", "face_cell", "face_side", "spacing"):
-        np.testing.assert_array_equal(getattr(frames.lattice, name), getattr(simulation.lattice, name))
+        np.testing.assert_array_equal(getattr(frames.mesh, name), getattr(simulation.mesh, name))
     assert frames.nearest(2.4e-3).number == 2
     with pytest.raises(SceneError, match=r"field = 'densty' .*did you mean density"):
         frame.field("densty")
@@ -93,13 +93,13 @@ def test_frames_are_the_first_steps_at_or_after_their_times(tmp_path, precision)
 @pytest.mark.parametrize("size", [(1.0,), (1.0, 0.5), (1.0, 0.5, 0.5)])
 def test_strain_of_a_uniform_deformation_is_exact(size):
     """u = A X: E = (A + Aᵀ + AᵀA)/2 at every node, large as it is; a rotation strains nothing."""
-    lattice = Box(size, 0.25).lattice()
-    dim, rng = lattice.dim, np.random.default_rng(1)
+    mesh = Box(size, 0.25).mesh()
+    dim, rng = mesh.dim, np.random.default_rng(1)
     for A in (0.3 * rng.standard_normal((dim, dim)), _turn(dim) - np.eye(dim)):
         E = 0.5 * (A + A.T + A.T @ A)
-        expected = [E[i, j] if max(i, j) < dim else 0.0 for i, j in lattice.continuum.pairs]
-        strain = green_strain(lattice, lattice.nodes @ A.T)
-        np.testing.assert_allclose(strain, np.tile(expected, (len(lattice.nodes), 1)), atol=1e-14)
+        expected = [E[i, j] if max(i, j) < dim else 0.0 for i, j in mesh.continuum.pairs]
+        strain = green_strain(mesh, mesh.nodes @ A.T)
+        np.testing.assert_allclose(strain, np.tile(expected, (len(mesh.nodes), 1)), atol=1e-14)
 
 
 def _turn(dim):
@@ -170,11 +170,11 @@ def test_a_full_disk_costs_the_frames_and_not_the_run(tmp_path, monkeypatch, cap
 
 def test_walls_are_the_faces_that_conditions_hold_or_move(tmp_path):
     scene = block()
-    lattice, walls = scene.lattice, {wall.name: wall for wall in walls_of(scene)}
+    mesh, walls = scene.mesh, {wall.name: wall for wall in walls_of(scene)}
     assert list(walls) == ["fixed_bottom", "roller_left", "moving_top"]
     assert [wall.still for wall in walls.values()] == [True, False, False]
     assert [len(wall.faces) for wall in walls.values()] == [8, 4, 4]
-    top = lattice.nodes[np.unique(lattice.faces[walls["moving_top"].faces])]
+    top = mesh.nodes[np.unique(mesh.faces[walls["moving_top"].faces])]
     assert (top[:, 1] == 0.2).all() and top[:, 0].max() == pytest.approx(0.2)
 
 
@@ -186,16 +186,16 @@ def test_a_wall_stands_a_radius_outside_its_nodes_and_follows_them(size):
         output=Output(field="displacement"),
         duration=1e-3,
     )
-    lattice, (wall,) = scene.lattice, walls_of(scene)
-    mesh = WallMesh.of(lattice, wall)
-    points = mesh.points(lattice.nodes)
+    mesh, (wall,) = scene.mesh, walls_of(scene)
+    built = WallMesh.of(mesh, wall)
+    points = built.points(mesh.nodes)
     assert points[:, 0].min() == pytest.approx(0.4 + 0.025)
-    assert mesh.polygons.shape[1] == 4 and set(mesh.polygons.ravel()) == set(range(len(points)))
-    moved = mesh.points(lattice.nodes + 0.1)
+    assert built.polygons.shape[1] == 4 and set(built.polygons.ravel()) == set(range(len(points)))
+    moved = built.points(mesh.nodes + 0.1)
     shift = np.zeros(3)
     shift[: len(size)] = 0.1
     np.testing.assert_allclose(moved, points + shift, atol=1e-12)
-    across = points[mesh.polygons]
+    across = points[built.polygons]
     areas = 0.5 * np.linalg.norm(np.cross(across[:, 2] - across[:, 0], across[:, 3] - across[:, 1]), axis=1)
     # A plate of (4 Δx)²; the four sides, 2 Δx and Δx wide, of a box as long as the edge; the face itself.
     expected = {1: 0.2**2, 2: 0.2 * 2 * (0.1 + 0.05), 3: 0.2 * 0.2}[len(size)]

@@ -27,9 +27,9 @@ from warpsph import (
     edge,
     where,
 )
-from warpsph.ground.launching import Launcher
+from warpsph.device.launching import Launcher
 from warpsph.operators.conditions import Conditions
-from warpsph.operators.surface_scan import SurfaceScan
+from warpsph.operators.surface.scan import SurfaceScan
 
 ELASTIC = Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0)
 # Exact to round-off: in float32 a position carries 1e-6 of a spacing, and a direction to the next node as much; in
@@ -54,9 +54,9 @@ def angles(a, b):
     return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(a - b, axis=1), 0.0, 1.0))
 
 
-def on_boundary(lattice):
-    mask = np.zeros(len(lattice.nodes), dtype=bool)
-    mask[lattice.faces] = True
+def on_boundary(mesh):
+    mask = np.zeros(len(mesh.nodes), dtype=bool)
+    mask[mesh.faces] = True
     return mask
 
 
@@ -225,13 +225,13 @@ BODIES = {
 def test_surface_nodes_and_normals(device, precision, name):
     """Exactly the boundary nodes that nobody moves are found, with normals as good as their order allows."""
     body = BODIES[name]()
-    reference = body.reference.lattice().nodes
+    reference = body.reference.mesh().nodes
     simulation = simulation_of(body.shape, device, precision, conditions=body.conditions)
     moved = np.zeros(len(reference), dtype=bool)
     for condition in body.conditions:
-        moved |= condition.on.nodes(simulation.lattice)
+        moved |= condition.on.nodes(simulation.mesh)
     free = simulation.field("free_surface")
-    assert np.array_equal(free, on_boundary(simulation.lattice) & ~moved)
+    assert np.array_equal(free, on_boundary(simulation.mesh) & ~moved)
 
     smooth, exact = body.smooth(reference), body.normal(reference)
     improved = angles(simulation.field("surface_normal"), exact)[smooth]
@@ -250,12 +250,12 @@ def test_scan_alone_tells_inside_from_surface(device, precision, name):
     The compressed and stretched lattices stay within what the text of `surface_scan` promises.
     """
     simulation = simulation_of(BODIES[name]().shape, device, precision)
-    everyone = np.arange(len(simulation.lattice.nodes))
+    everyone = np.arange(len(simulation.mesh.nodes))
     scan = SurfaceScan(
         simulation.scene, everyone, simulation.nodes, simulation.precision, Launcher(simulation.device)
     )
     scan.find(simulation.nodes)
-    assert np.array_equal(scan.candidates.exposed.numpy() == 1, on_boundary(simulation.lattice))
+    assert np.array_equal(scan.candidates.exposed.numpy() == 1, on_boundary(simulation.mesh))
 
 
 def test_normals_converge_with_second_order(device):
@@ -263,7 +263,7 @@ def test_normals_converge_with_second_order(device):
     errors = []
     for nodes_per_wave in (20, 40):
         body = wavy(nodes_per_wave)
-        reference = body.reference.lattice().nodes
+        reference = body.reference.mesh().nodes
         simulation = simulation_of(body.shape, device, "float64", conditions=body.conditions)
         error = angles(simulation.field("surface_normal"), body.normal(reference))[body.smooth(reference)]
         errors.append(np.sqrt(np.mean(error**2)))
@@ -275,11 +275,11 @@ def test_staircase(device, precision, record_property):
     inside; all other edge nodes are found. The normals are those of the steps, up to 45° off the circle's.
     """
     simulation = simulation_of(Disc(1.0, 1.0 / 13.0), device, precision)
-    lattice = simulation.lattice
-    cells = np.bincount(lattice.cells.ravel(), minlength=len(lattice.nodes))
+    mesh = simulation.mesh
+    cells = np.bincount(mesh.cells.ravel(), minlength=len(mesh.nodes))
     free = simulation.field("free_surface")
-    assert np.array_equal(free, on_boundary(lattice) & (cells < 3))
-    error = np.rad2deg(angles(simulation.field("surface_normal"), unit(lattice.nodes)))[free]
+    assert np.array_equal(free, on_boundary(mesh) & (cells < 3))
+    error = np.rad2deg(angles(simulation.field("surface_normal"), unit(mesh.nodes)))[free]
     record_property("mean angle to the circle's normal [deg]", float(error.mean()))
     assert error.max() <= 45.0
 
@@ -315,8 +315,8 @@ def test_candidates_end_at_the_walls():
     """The free edges with their ends, which lie on walls as well; no other node of a wall."""
     walls = [Roller(edge("left")), Fixed(edge("bottom"))]
     scene = plane(conditions=walls, free_surface=FreeSurface())
-    candidates = scene.free_surface.candidates(scene.lattice, scene.boundary)
-    x = scene.lattice.nodes
+    candidates = scene.free_surface.candidates(scene.mesh, scene.boundary)
+    x = scene.mesh.nodes
     assert candidates.tolist() == np.flatnonzero(np.isclose(x, 1.0).any(axis=1)).tolist()
 
 
@@ -346,12 +346,12 @@ def test_tractions_vanish(device, precision, size, stress, scheme):
     uniform = tuple(float(s) for s in stress)
     numerics = numerics_of(scheme)
     simulation = simulation_of(shape, device, precision, stress=lambda *x: uniform, numerics=numerics)
-    reference = Box(size, 0.1).lattice().nodes
+    reference = Box(size, 0.1).mesh().nodes
     turn = np.eye(3)
     turn[:2, :2] = rotation(angle)
     on_face = [np.isclose(reference[:, k], 0.0) | np.isclose(reference[:, k], size[k]) for k in range(dim)]
     on_face = np.stack(on_face, axis=1)
-    pairs = simulation.lattice.continuum.pairs
+    pairs = simulation.mesh.continuum.pairs
     before = tensors(np.array([uniform]), pairs)[0]
     after = tensors(simulation.field("stress").astype(float), pairs)
     for node, on in enumerate(on_face):
@@ -414,7 +414,7 @@ def test_end_of_a_footing(device, precision, end, tilt, freed, scheme):
     expected = np.array([0.0 if freed else 1.0, 2.0, 0.0, 4.0])
     if freed and scheme == "compatible":
         x, y = np.eye(2)
-        start = tensors(np.array([[1.0, 2.0, 3.0, 4.0]]), simulation.lattice.continuum.pairs)[0]
+        start = tensors(np.array([[1.0, 2.0, 3.0, 4.0]]), simulation.mesh.continuum.pairs)[0]
         left = released(start, [(x, x), (x, y)], ELASTIC.lame_modulus, ELASTIC.shear_modulus)
         expected = np.array([left[0, 0], left[1, 1], left[0, 1], left[2, 2]])
         ratio = ELASTIC.poisson_ratio / (1.0 - ELASTIC.poisson_ratio)  # λ/(λ + 2G)
@@ -442,7 +442,7 @@ def test_normals_follow_a_rotation(device, precision):
         velocity=lambda x, y: (-y, x),
         numerics=Numerics(velocity_scheme="taylor"),
     )
-    x0 = simulation.lattice.nodes
+    x0 = simulation.mesh.nodes
     right = np.flatnonzero(np.isclose(x0[:, 0], 0.2) & (np.abs(x0[:, 1]) < 0.15))
     rim = np.flatnonzero(simulation.field("free_surface"))
     fresh = SurfaceScan(simulation.scene, rim, simulation.nodes, simulation.precision, Launcher(simulation.device))

@@ -23,7 +23,7 @@ from warpsph import (
     region,
 )
 from warpsph.cli.catalogue import load
-from warpsph.operators.damping import STRESS_SHARE
+from warpsph.operators.checkerboard import STRESS_SHARE
 from warpsph.step.compatible import VELOCITY_SHARE
 
 from .motions import SOFT, Energies, hanging_bar, return_error, standing_mode
@@ -219,8 +219,8 @@ def test_stretch_to_three_times_the_size(dim):
     """
     rate, cells = 20.0, 6
     shape = Box((1.0,) * dim, 1.0 / cells)
-    lattice = shape.lattice()
-    boundary = lattice.nodes[edge("boundary").nodes(lattice)]
+    mesh = shape.mesh()
+    boundary = mesh.nodes[edge("boundary").nodes(mesh)]
     scene = Scene(
         shape=shape,
         material=SOFT,
@@ -255,7 +255,7 @@ def test_strip_pulled_almost_to_the_end_of_its_material():
     )
     simulation = Simulation(scene, device="cpu")
     simulation.run()
-    middle = np.abs(scene.lattice.nodes[:, 0] - 0.5) < 0.3
+    middle = np.abs(scene.mesh.nodes[:, 0] - 0.5) < 0.3
     exact = SOFT.young_modulus / (1.0 - 0.3**2) * np.log(stretch)
     np.testing.assert_allclose(simulation.field("stress")[middle, 0], exact, rtol=0.02)
     height = np.ptp(simulation.field("position")[middle, 1]) / 0.5

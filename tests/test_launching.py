@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import warp as wp
+from warpsph.device import launching
 
 from warpsph import (
     BodyForce,
@@ -22,8 +23,7 @@ from warpsph import (
     Simulation,
     edge,
 )
-from warpsph.ground import launching
-from warpsph.ground.launching import Launcher
+from warpsph.device.launching import Launcher
 from warpsph.simulation import simulation as simulation_module
 from warpsph.simulation.device import all_cores, choose_threads, start_warp
 
@@ -62,7 +62,7 @@ STATE = ("position", "velocity", "stress", "equivalent_plastic_strain", "density
 def state_after(simulation, observers=()):
     """All fields at the end, the number of steps and of list builds."""
     simulation.run(observers=observers)
-    fields = np.hstack([simulation.field(name).reshape(len(simulation.lattice.nodes), -1) for name in STATE])
+    fields = np.hstack([simulation.field(name).reshape(len(simulation.mesh.nodes), -1) for name in STATE])
     return fields.tobytes(), simulation.steps, simulation.list_builds
 
 
@@ -173,7 +173,7 @@ def test_an_interrupt_waits_for_the_steps_that_run(threads):
 def test_large_bodies_look_up_often(monkeypatch):
     """A signal waits for no more than `AHEAD_ON_CPU` node-steps."""
     simulation, made = Simulation(pressed(), device="cpu"), []
-    monkeypatch.setattr(simulation_module, "AHEAD_ON_CPU", 5 * len(simulation.lattice.nodes))
+    monkeypatch.setattr(simulation_module, "AHEAD_ON_CPU", 5 * len(simulation.mesh.nodes))
     advance = simulation._stepper.advance
     monkeypatch.setattr(simulation._stepper, "advance", lambda *given: made.append(advance(*given)) or made[-1])
     simulation.run()

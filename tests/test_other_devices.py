@@ -6,8 +6,8 @@ import warp as wp
 
 from tests.test_launching import SCENES, STATE, pressed
 from warpsph import Numerics, Simulation
-from warpsph.ground.arrays import ALIGNMENT
-from warpsph.operators.sweep import GPU_BATCH
+from warpsph.device.arrays import ALIGNMENT
+from warpsph.operators.neighbour_sums import GPU_BATCH
 from warpsph.simulation.state import slots
 from warpsph.step import compatible, published, step
 

@@ -51,23 +51,23 @@ def test_series_holds_the_frames_at_their_times(run):
     sets = ElementTree.parse(run / "body.pvd").getroot().findall("Collection/DataSet")
     frames = Frames(run)
     assert [float(part.get("timestep")) for part in sets] == [frame.time for frame in frames]
-    lattice = frames.lattice
+    mesh = frames.mesh
     for part, frame in zip(sets, frames, strict=True):
         body, points, arrays = read(run / part.get("file"))
-        count = len(lattice.nodes)
-        np.testing.assert_allclose(points[:, : lattice.dim], frame.field("position"), atol=1e-12)
-        assert not points[:, lattice.dim :].any() and body.GetNumberOfVerts() == count
+        count = len(mesh.nodes)
+        np.testing.assert_allclose(points[:, : mesh.dim], frame.field("position"), atol=1e-12)
+        assert not points[:, mesh.dim :].any() and body.GetNumberOfVerts() == count
         assert set(arrays) == set(frames.fields) - {"position"}
         for name, array in arrays.items():
             expected = np.asarray(frame.field(name), dtype=np.float32)
             if name in ("stress", "strain"):
                 assert array.shape == (count, 6)
             elif expected.ndim == 2:
-                np.testing.assert_array_equal(array, np.pad(expected, ((0, 0), (0, 3 - lattice.dim))))
+                np.testing.assert_array_equal(array, np.pad(expected, ((0, 0), (0, 3 - mesh.dim))))
             else:
                 np.testing.assert_array_equal(array, expected)
-        assert body.GetNumberOfLines() == (len(lattice.cells) if lattice.dim == 1 else 0)
-        assert body.GetNumberOfPolys() == {1: 0, 2: len(lattice.cells), 3: len(lattice.faces)}[lattice.dim]
+        assert body.GetNumberOfLines() == (len(mesh.cells) if mesh.dim == 1 else 0)
+        assert body.GetNumberOfPolys() == {1: 0, 2: len(mesh.cells), 3: len(mesh.faces)}[mesh.dim]
         assert _area(body, points) == pytest.approx(_expected_area(frame))
 
 
@@ -83,12 +83,12 @@ def _area(body, points):
 
 
 def _expected_area(frame):
-    position, lattice = frame.field("position"), frame.lattice
-    if lattice.dim == 1:
+    position, mesh = frame.field("position"), frame.mesh
+    if mesh.dim == 1:
         return 0.0
-    if lattice.dim == 2:
-        return lattice.with_nodes(position).cell_volumes().sum()
-    faces = position[lattice.faces]
+    if mesh.dim == 2:
+        return mesh.with_nodes(position).cell_volumes().sum()
+    faces = position[mesh.faces]
     return 0.5 * np.linalg.norm(np.cross(faces[:, 3] - faces[:, 0], faces[:, 2] - faces[:, 1]), axis=1).sum()
 
 
@@ -96,7 +96,7 @@ def test_tensors_are_in_vtk_s_order(run):
     pytest.importorskip("vtkmodules", reason="VTK is not installed (extra vtk)")
     assert main(["export", str(run), str(run / "body.pvd")]) == 0
     body, points, arrays = read(run / "body_frames" / "000000.vtp")
-    dim = Frames(run).lattice.dim
+    dim = Frames(run).mesh.dim
     inside = np.all((points[:, :dim] > 0.05) & (points[:, :dim] < np.array([0.35, 0.25, 0.15])[:dim]), axis=1)
     np.testing.assert_array_equal(arrays["stress"][inside], np.tile(IN_VTK[dim], (inside.sum(), 1)))
     array = body.GetPointData().GetArray("stress")

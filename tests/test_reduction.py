@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpsph.ground.launching import Launcher
-from warpsph.ground.precision import precision as precision_of
-from warpsph.ground.reduction import SHARE, LargestMagnitude
+from warpsph.device.launching import Launcher
+from warpsph.device.precision import precision as precision_of
+from warpsph.device.reduction import SHARE, LargestMagnitude
 
 
 @pytest.mark.parametrize("n", [1, SHARE - 1, SHARE, SHARE + 1, 100 * SHARE + 7])

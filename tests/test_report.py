@@ -9,12 +9,12 @@ import pytest
 from warpsph.cli import scene_run
 from warpsph.cli.main import main
 from warpsph.cli.queue import make_missing, processes
-from warpsph.cli.report.case import Picture, Row, Section, Table
-from warpsph.cli.report.cases import cases, elastic_bar, hanging_bar, wavy_surface
-from warpsph.cli.report.drawing import Curve, diagram
-from warpsph.cli.report.page import write_html, write_markdown
-from warpsph.cli.report.prose import TEXTS, Prose, prose
-from warpsph.cli.report.runs import Run
+from warpsph.report.case import Picture, Row, Section, Table
+from warpsph.report.cases import cases, elastic_bar, hanging_bar, wavy_surface
+from warpsph.report.drawing import Curve, diagram
+from warpsph.report.page import write_html, write_markdown
+from warpsph.report.prose import TEXTS, Prose, prose
+from warpsph.report.runs import Run
 
 SCENE = '''"""Bar for the tests."""
 from warpsph import *

@@ -5,15 +5,15 @@ import pytest
 
 from warpsph import Box, SceneError, edge, everywhere, region, where
 
-PLATE = Box((1.0, 0.5), 0.1).lattice()
+PLATE = Box((1.0, 0.5), 0.1).mesh()
 X, Y = PLATE.nodes.T
-BLOCK = Box((1.0, 0.5, 0.5), 0.25).lattice()
+BLOCK = Box((1.0, 0.5, 0.5), 0.25).mesh()
 
 
-def face_names(selection, lattice=PLATE):
+def face_names(selection, mesh=PLATE):
     """Names of the edges whose faces may give the selection's nodes a normal."""
-    sides = np.unique(lattice.face_side[selection.faces(lattice)])
-    return {lattice.continuum.edges[side] for side in sides}
+    sides = np.unique(mesh.face_side[selection.faces(mesh)])
+    return {mesh.continuum.edges[side] for side in sides}
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_edges_of_a_block(name, axis, value):
 
 
 def test_edges_of_a_bar_are_its_ends():
-    bar = Box((1.0,), 0.25).lattice()
+    bar = Box((1.0,), 0.25).mesh()
     assert edge("left").nodes(bar).tolist() == [True, False, False, False, False]
     assert edge("right").nodes(bar).tolist() == [False, False, False, False, True]
 
@@ -52,7 +52,7 @@ def test_boundary_is_all_edges():
 
 
 def test_edge_names_turn_with_the_lattice():
-    turned = Box((1.0, 0.5), 0.1).rotated(0.4).lattice()
+    turned = Box((1.0, 0.5), 0.1).rotated(0.4).mesh()
     assert np.array_equal(edge("top").nodes(turned), edge("top").nodes(PLATE))
 
 
@@ -65,11 +65,11 @@ def test_region_includes_its_sides():
 @pytest.mark.parametrize("origin", [0.0, 0.1, -0.7, 1000.0])
 def test_where_includes_a_node_on_its_limit(origin):
     """0.1 + 2 · 0.1 > 0.3 in floating point: round-off must not decide which nodes are selected."""
-    lattice = Box((1.0, 0.5), 0.1, origin=(origin, 0.0)).lattice()
+    mesh = Box((1.0, 0.5), 0.1, origin=(origin, 0.0)).mesh()
     limit = round(origin + 0.3, 9)
-    assert where(lambda x, y: x <= limit).nodes(lattice).sum() == 4 * 6
-    assert where(lambda x, y: x >= limit).nodes(lattice).sum() == 8 * 6
-    assert where(lambda x, y: x < limit).nodes(lattice).sum() == 3 * 6
+    assert where(lambda x, y: x <= limit).nodes(mesh).sum() == 4 * 6
+    assert where(lambda x, y: x >= limit).nodes(mesh).sum() == 8 * 6
+    assert where(lambda x, y: x < limit).nodes(mesh).sum() == 3 * 6
 
 
 def test_where_may_give_a_normal_on_every_edge():

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from warpsph import Box, Disc, Polygon
 from warpsph.scene import CONTINUA
-from warpsph.scene.output import face_areas
 
 BAR = Box((1.0,), 0.1)
 PLATE = Box((2.0, 1.0), 0.25)
@@ -60,89 +59,87 @@ def points(array):
     [(BAR, 11, 10, 2), (PLATE, 9 * 5, 8 * 4, 2 * (8 + 4)), (BLOCK, 5 * 3 * 4, 4 * 2 * 3, 2 * (8 + 12 + 6))],
 )
 def test_box_has_all_lattice_points(shape, nodes, cells, faces):
-    lattice = shape.lattice()
-    assert (len(lattice.nodes), len(lattice.cells), len(lattice.faces)) == (nodes, cells, faces)
-    assert points(lattice.nodes) == box_nodes(shape.size, shape.spacing, shape.origin)
+    mesh = shape.mesh()
+    assert (len(mesh.nodes), len(mesh.cells), len(mesh.faces)) == (nodes, cells, faces)
+    assert points(mesh.nodes) == box_nodes(shape.size, shape.spacing, shape.origin)
 
 
 def test_box_cell_is_the_corners_around_its_centre_last_axis_fastest():
-    lattice = PLATE.lattice()
-    corners = lattice.nodes[lattice.cells]
+    mesh = PLATE.mesh()
+    corners = mesh.nodes[mesh.cells]
     half = 0.125 * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
     assert np.allclose(corners - corners.mean(axis=1, keepdims=True), half, atol=1e-15)
 
 
 @pytest.mark.parametrize("shape", [BAR, PLATE, BLOCK])
 def test_box_node_mass_halves_on_every_side_and_weight_does_not(shape):
-    lattice = shape.lattice()
-    low, high = lattice.nodes.min(axis=0), lattice.nodes.max(axis=0)
-    sides = np.isclose(lattice.nodes, low) | np.isclose(lattice.nodes, high)
-    mass, weight = lattice.node_volumes()
-    cell = shape.spacing**lattice.dim
+    mesh = shape.mesh()
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    sides = np.isclose(mesh.nodes, low) | np.isclose(mesh.nodes, high)
+    mass, weight = mesh.node_volumes()
+    cell = shape.spacing**mesh.dim
     assert np.allclose(mass, cell * 0.5 ** sides.sum(axis=1), rtol=1e-12)
     assert np.allclose(weight, cell, rtol=1e-12)
 
 
 @pytest.mark.parametrize("shape", [BAR, PLATE, BLOCK])
 def test_box_edges_are_its_sides_with_axis_normals(shape):
-    lattice = shape.lattice()
-    normals = lattice.face_normals()
-    for side, name in enumerate(CONTINUA[lattice.dim].edges):
+    mesh = shape.mesh()
+    normals = mesh.face_normals()
+    for side, name in enumerate(CONTINUA[mesh.dim].edges):
         axis, high = divmod(side, 2)
-        faces = lattice.face_side == side
+        faces = mesh.face_side == side
         wall = shape.origin[axis] + (shape.size[axis] if high else 0.0)
-        on_wall = np.isclose(lattice.nodes[:, axis], wall)
-        assert set(lattice.faces[faces].ravel()) == set(np.flatnonzero(on_wall)), name
-        assert np.array_equal(
-            normals[faces], np.tile((2 * high - 1) * np.eye(lattice.dim)[axis], (faces.sum(), 1))
-        )
+        on_wall = np.isclose(mesh.nodes[:, axis], wall)
+        assert set(mesh.faces[faces].ravel()) == set(np.flatnonzero(on_wall)), name
+        assert np.array_equal(normals[faces], np.tile((2 * high - 1) * np.eye(mesh.dim)[axis], (faces.sum(), 1)))
 
 
 def test_end_coordinates_of_a_long_bar_are_exact():
-    nodes = Box((0.7,), 0.7 / 997, origin=(0.1,)).lattice().nodes[:, 0]
+    nodes = Box((0.7,), 0.7 / 997, origin=(0.1,)).mesh().nodes[:, 0]
     assert nodes[0] == 0.1 and nodes[-1] == 0.1 + 0.7
 
 
 def test_disc_is_the_cells_whose_centre_is_inside():
     radius, spacing, centre = 1.0, 0.25, np.array([3.0, -1.0])
-    lattice = Disc(radius, spacing, tuple(centre)).lattice()
+    mesh = Disc(radius, spacing, tuple(centre)).mesh()
     inside = {
         (x, y)
         for x in np.arange(-7, 8, 2) * spacing / 2
         for y in np.arange(-7, 8, 2) * spacing / 2
         if math.hypot(x, y) < radius
     }
-    assert points(lattice.nodes[lattice.cells].mean(axis=1) - centre) == inside
+    assert points(mesh.nodes[mesh.cells].mean(axis=1) - centre) == inside
 
 
 @pytest.mark.parametrize("spacing", [0.25, 0.3, 0.4, 0.7])
 def test_disc_looks_the_same_after_a_quarter_turn(spacing):
-    nodes = Disc(1.0, spacing, centre=(3.0, -1.0)).lattice().nodes - [3.0, -1.0]
+    nodes = Disc(1.0, spacing, centre=(3.0, -1.0)).mesh().nodes - [3.0, -1.0]
     assert points(nodes) == points(nodes @ [[0.0, 1.0], [-1.0, 0.0]])
 
 
 def test_disc_area_approaches_the_circle():
     """Gauss's circle problem: the cells cut by the circle bound the error, and it is far smaller than that."""
-    volumes = Disc(1.0, 0.02).lattice().cell_volumes()
+    volumes = Disc(1.0, 0.02).mesh().cell_volumes()
     assert volumes.sum() == pytest.approx(math.pi, abs=0.02)
 
 
 @pytest.mark.parametrize(("polygon", "area", "outline"), [(ELL, 3.0, 8.0), (CHANNEL, 5.0, 12.0)])
 def test_polygon_with_lattice_sides_has_its_area_and_outline(polygon, area, outline):
-    lattice = polygon.lattice()
-    assert lattice.cell_volumes().sum() == pytest.approx(area, rel=1e-12)
-    assert face_areas(lattice.nodes[lattice.faces]).sum() == pytest.approx(outline, rel=1e-12)
-    assert (1.25, 1.25) not in points(lattice.nodes)
+    mesh = polygon.mesh()
+    assert mesh.cell_volumes().sum() == pytest.approx(area, rel=1e-12)
+    assert mesh.face_areas().sum() == pytest.approx(outline, rel=1e-12)
+    assert (1.25, 1.25) not in points(mesh.nodes)
 
 
 def test_polygon_does_not_depend_on_the_sense_of_its_corners():
-    forth, back = ELL.lattice(), Polygon(ELL.vertices[::-1], 0.25).lattice()
+    forth, back = ELL.mesh(), Polygon(ELL.vertices[::-1], 0.25).mesh()
     assert np.array_equal(forth.nodes, back.nodes) and np.array_equal(forth.cells, back.cells)
 
 
 def test_triangle_keeps_cells_whose_centre_is_inside():
-    lattice = Polygon([(0, 0), (2, 0), (0, 1)], 0.125).lattice()
-    centres = lattice.nodes[lattice.cells].mean(axis=1)
+    mesh = Polygon([(0, 0), (2, 0), (0, 1)], 0.125).mesh()
+    centres = mesh.nodes[mesh.cells].mean(axis=1)
     grid = (np.indices((16, 8)).reshape(2, -1).T + 0.5) * 0.125
     assert points(centres) == points(grid[grid[:, 0] + 2.0 * grid[:, 1] < 2.0])
 
@@ -150,7 +147,7 @@ def test_triangle_keeps_cells_whose_centre_is_inside():
 @pytest.mark.parametrize("shape", [PLATE, BLOCK, ELL])
 def test_rotation_turns_nodes_and_normals_and_keeps_volumes(shape):
     angle, about = 0.7, np.array([1.0, 2.0])
-    before, after = shape.lattice(), shape.rotated(angle, about=tuple(about)).lattice()
+    before, after = shape.mesh(), shape.rotated(angle, about=tuple(about)).mesh()
     turn = np.eye(before.dim)
     turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     centre = np.concatenate([about, np.zeros(before.dim - 2)])
@@ -161,58 +158,56 @@ def test_rotation_turns_nodes_and_normals_and_keeps_volumes(shape):
 
 
 def test_linear_map_scales_volumes_by_its_determinant():
-    assert np.allclose(SLANTED.lattice().cell_volumes(), 2.0 * 1.0 * 1.5 * 0.25**3, rtol=1e-12)
+    assert np.allclose(SLANTED.mesh().cell_volumes(), 2.0 * 1.0 * 1.5 * 0.25**3, rtol=1e-12)
 
 
 def test_mapped_cell_areas_are_those_of_the_quadrilaterals():
-    lattice = RING.lattice()
-    a, b, c, d = np.moveaxis(lattice.nodes[lattice.cells], 1, 0)
+    mesh = RING.mesh()
+    a, b, c, d = np.moveaxis(mesh.nodes[mesh.cells], 1, 0)
     ring = np.stack([a, c, d, b], axis=1)
     x, y = ring[..., 0], ring[..., 1]
     shoelace = 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
-    assert np.allclose(lattice.cell_volumes(), shoelace, rtol=1e-12)
+    assert np.allclose(mesh.cell_volumes(), shoelace, rtol=1e-12)
 
 
 def test_mapped_edges_keep_the_names_of_the_unmapped_shape():
-    lattice = RING.lattice()
-    radius = np.linalg.norm(lattice.nodes, axis=1)
-    outer = lattice.faces[lattice.face_side == CONTINUA[2].edges.index("right")]
-    top = lattice.faces[lattice.face_side == CONTINUA[2].edges.index("top")]
+    mesh = RING.mesh()
+    radius = np.linalg.norm(mesh.nodes, axis=1)
+    outer = mesh.faces[mesh.face_side == CONTINUA[2].edges.index("right")]
+    top = mesh.faces[mesh.face_side == CONTINUA[2].edges.index("top")]
     assert np.allclose(radius[outer], 3.0, rtol=1e-12)
-    assert np.allclose(lattice.nodes[top][..., 0], 0.0, atol=1e-12)
+    assert np.allclose(mesh.nodes[top][..., 0], 0.0, atol=1e-12)
 
 
 def test_longest_and_shortest_distances_of_a_stretched_cell():
-    lattice = Box((1.0, 1.0), 0.5).mapped(lambda x, y: (2.0 * x, 0.5 * y)).lattice()
-    assert (lattice.largest_edge(), lattice.smallest_edge()) == pytest.approx((1.0, 0.25), rel=1e-12)
+    mesh = Box((1.0, 1.0), 0.5).mapped(lambda x, y: (2.0 * x, 0.5 * y)).mesh()
+    assert (mesh.largest_edge(), mesh.smallest_edge()) == pytest.approx((1.0, 0.25), rel=1e-12)
 
 
 @every_shape
 def test_masses_add_up_to_volume(shape):
-    lattice = shape.lattice()
-    mass, weight = lattice.node_volumes()
-    assert mass.sum() == pytest.approx(lattice.cell_volumes().sum(), rel=1e-12)
+    mesh = shape.mesh()
+    mass, weight = mesh.node_volumes()
+    assert mass.sum() == pytest.approx(mesh.cell_volumes().sum(), rel=1e-12)
     assert (weight >= mass * (1.0 - 1e-12)).all()
 
 
 @every_shape
 def test_faces_close_the_body(shape):
     """Σ A n = 0, and Σ A x·n = d V with x the middle of each face (Gauss's theorem, flat faces)."""
-    lattice = shape.lattice()
-    corners, normals = lattice.nodes[lattice.faces], lattice.face_normals()
-    areas = face_areas(corners)
+    mesh = shape.mesh()
+    corners, normals = mesh.nodes[mesh.faces], mesh.face_normals()
+    areas = mesh.face_areas()
     flux = np.sum(areas * np.sum(corners.mean(axis=1) * normals, axis=1))
     assert np.allclose(areas @ normals, 0.0, atol=1e-12)
-    assert flux == pytest.approx(lattice.dim * lattice.cell_volumes().sum(), rel=1e-12)
+    assert flux == pytest.approx(mesh.dim * mesh.cell_volumes().sum(), rel=1e-12)
 
 
 @every_shape
 def test_normals_are_unit_and_point_out_of_the_face_s_cell(shape):
-    lattice = shape.lattice()
-    normals = lattice.face_normals()
-    outward = lattice.nodes[lattice.faces].mean(axis=1) - lattice.nodes[lattice.cells[lattice.face_cell]].mean(
-        axis=1
-    )
+    mesh = shape.mesh()
+    normals = mesh.face_normals()
+    outward = mesh.nodes[mesh.faces].mean(axis=1) - mesh.nodes[mesh.cells[mesh.face_cell]].mean(axis=1)
     assert np.allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=1e-14)
     assert (np.sum(normals * outward, axis=1) > 0.0).all()
 
@@ -220,15 +215,15 @@ def test_normals_are_unit_and_point_out_of_the_face_s_cell(shape):
 @every_shape
 def test_interior_sides_of_cells_are_no_faces(shape):
     """Every side of every cell is either shared by two cells or one boundary face."""
-    lattice = shape.lattice()
-    dim, count = lattice.dim, {}
+    mesh = shape.mesh()
+    dim, count = mesh.dim, {}
     bits = np.array(list(np.ndindex(*(2,) * dim)))
     for axis in range(dim):
         for high in (0, 1):
-            for side in np.sort(lattice.cells[:, bits[:, axis] == high], axis=1).tolist():
+            for side in np.sort(mesh.cells[:, bits[:, axis] == high], axis=1).tolist():
                 count[tuple(side)] = count.get(tuple(side), 0) + 1
     alone = sorted(side for side, times in count.items() if times == 1)
-    assert alone == sorted(tuple(face) for face in np.sort(lattice.faces, axis=1).tolist())
+    assert alone == sorted(tuple(face) for face in np.sort(mesh.faces, axis=1).tolist())
 
 
 @settings(max_examples=50, deadline=None)
@@ -240,12 +235,12 @@ def test_interior_sides_of_cells_are_no_faces(shape):
 def test_any_box_is_whole(cells, spacing, origin):
     dim = len(cells)
     size = tuple(spacing * n for n in cells)
-    lattice = Box(size, spacing, origin=tuple(origin[:dim])).lattice()
-    mass, _ = lattice.node_volumes()
-    normals = lattice.face_normals()
+    mesh = Box(size, spacing, origin=tuple(origin[:dim])).mesh()
+    mass, _ = mesh.node_volumes()
+    normals = mesh.face_normals()
     middle = np.array(origin[:dim]) + 0.5 * np.array(size)
     assert mass.sum() == pytest.approx(math.prod(size), rel=1e-8)
-    assert lattice.cells.shape == (math.prod(cells), 2**dim)
-    assert all(len(set(cell)) == 2**dim for cell in lattice.cells.tolist())
+    assert mesh.cells.shape == (math.prod(cells), 2**dim)
+    assert all(len(set(cell)) == 2**dim for cell in mesh.cells.tolist())
     assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
-    assert (np.sum(normals * (lattice.nodes[lattice.faces].mean(axis=1) - middle), axis=1) > 0.0).all()
+    assert (np.sum(normals * (mesh.nodes[mesh.faces].mean(axis=1) - middle), axis=1) > 0.0).all()

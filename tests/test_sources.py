@@ -5,9 +5,9 @@ import pytest
 import warp as wp
 
 from warpsph import BodyForce, Box, Elastic, Fixed, Numerics, PerzynaVonMises, Scene, Simulation, everywhere
-from warpsph.ground.kinematics import kinematics
-from warpsph.ground.linear_algebra import rotation_of
-from warpsph.ground.precision import PRECISIONS
+from warpsph.device.linear_algebra import rotation_of
+from warpsph.device.precision import PRECISIONS
+from warpsph.physics.stress import kinematics
 from warpsph.scene import BAR, PLANE_STRAIN, SOLID
 
 STRESS = {1: (3e5,), 2: (3e5, -1e5, 5e4, 2e4), 3: (3e5, -1e5, 2e4, 5e4, -4e4, 6e4)}
@@ -52,7 +52,7 @@ def test_relaxation_follows_its_exponential(device, precision, dim, source_schem
     """
     simulation = relaxing(dim, device, precision, source_scheme, fluidity=0.5, yield_size=1e5)
     material = simulation.scene.material
-    start, continuum = simulation.field("von_mises_stress"), simulation.lattice.continuum
+    start, continuum = simulation.field("von_mises_stress"), simulation.mesh.continuum
     for _ in range(20):
         simulation.step()
     rate = material.relaxation_modulus(dim) * material.fluidity / material.yield_size

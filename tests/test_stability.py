@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from warpsph import Box, Elastic, Fixed, Free, Numerics, Roller, Scene, Simulation, edge
-from warpsph.scene.dimension import CONTINUA
+from warpsph.mesh.continuum import CONTINUA
 from warpsph.scene.numerics import KERNELS
 from warpsph.simulation.time_step import courant_limit
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tools"))
-from von_neumann import COURANT, Lattice, curves, spectral_radius
+from von_neumann import COURANT, Mesh, curves, spectral_radius
 
 POISSON = (0.0, 0.3, 0.45, 0.499)
 REACH = (1.7, 1.8, 2.2, 3.0)  # of the kernel [Δx]; 1.8 is the default
@@ -35,9 +35,9 @@ def test_no_wave_grows_with_the_compatible_scheme(dim, waves, kernel, viscosity)
     """Every Courant number up to 1, any Poisson's ratio, with the front viscosity off and full."""
     for reach in REACH:
         for nu in POISSON:
-            lattice = Lattice(dim, kernel, reach / KERNELS[kernel].support, nu)
+            mesh = Mesh(dim, kernel, reach / KERNELS[kernel].support, nu)
             for courant in np.linspace(0.1, 1.0, 10):
-                radius = spectral_radius(lattice, "compatible", courant, viscosity, waves)
+                radius = spectral_radius(mesh, "compatible", courant, viscosity, waves)
                 assert radius <= 1.0 + 1e-9, (reach, nu, courant)
 
 
@@ -52,9 +52,9 @@ def test_courant_limit_is_where_waves_begin_to_grow(dim, waves, kernel, scheme):
         if scheme == "compatible":
             assert limit <= 1.0
             limit = 1.0
-        lattice = Lattice(dim, kernel, ratio)
-        assert spectral_radius(lattice, scheme, limit * (1.0 - 1e-9), n=waves) <= 1.0 + 1e-9, reach
-        assert spectral_radius(lattice, scheme, limit * 1.03, n=waves) > 1.0 + 1e-6, reach
+        mesh = Mesh(dim, kernel, ratio)
+        assert spectral_radius(mesh, scheme, limit * (1.0 - 1e-9), n=waves) <= 1.0 + 1e-9, reach
+        assert spectral_radius(mesh, scheme, limit * 1.03, n=waves) > 1.0 + 1e-6, reach
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])
@@ -64,7 +64,7 @@ def test_long_waves_are_of_second_order_in_speed_and_of_fourth_in_damping(dim):
     for kind in ("P", "S")[: 1 if dim == 1 else 2]:
         for direction in (np.eye(dim)[0], np.ones(dim) / np.sqrt(dim)):
             for courant in COURANT:
-                speed, loss = curves(Lattice(dim), "compatible", courant, kind, direction, per_wave)
+                speed, loss = curves(Mesh(dim), "compatible", courant, kind, direction, per_wave)
                 assert np.log2(np.divide(*np.abs(speed - 1.0))) == pytest.approx(2.0, abs=0.1)
                 assert np.log2(np.divide(*loss)) == pytest.approx(3.0, abs=0.6), (
                     "a period has as many steps as cells"
@@ -91,14 +91,14 @@ def test_analysis_is_that_of_the_code(dim):
             numerics=numerics,
         )
         simulation = Simulation(scene, device="cpu")
-        x = simulation.lattice.nodes
+        x = simulation.mesh.nodes
         middle = simulation.nearest_node((0.5 * cells,) * dim)
         phase = np.exp(1j * (x - x[middle]) @ k)
         found = np.zeros(dim + size, dtype=complex)
         scale = np.array([1.0] * dim + [unit] * size)
         for part, factor in ((phase.real, 1.0), (phase.imag, 1j)):
             found += factor * stepped(simulation, part[:, None] * amplitude * scale)[middle] / scale
-        matrix = Lattice(dim).step(k[None], scheme, 0.6, viscosity=float(scheme == "compatible"))[0]
+        matrix = Mesh(dim).step(k[None], scheme, 0.6, viscosity=float(scheme == "compatible"))[0]
         turn = np.array([1.0] * dim + [1j] * (len(kept) - dim))  # the analysis has σ/i for σ
         expected = turn * (matrix @ (amplitude[kept] / turn))
         assert np.abs(found[kept] - expected).max() <= 1e-12, scheme
@@ -108,7 +108,7 @@ def stepped(simulation, phi, calm=True):
     """φ (n, d + s) after one step. A body that kept its volume so far has the front viscosity in full; one that
     was not `calm` was strained so much faster, by a checkerboard, that no rate now looks like a front. Both were
     sheared so fast that the stress's checkerboard is damped without bound."""
-    nodes, cells = simulation.nodes, simulation.lattice.nodes
+    nodes, cells = simulation.nodes, simulation.mesh.nodes
     point = nodes.point.numpy()
     point["phi"] = phi
     nodes.point.assign(point)

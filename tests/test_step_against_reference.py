@@ -96,14 +96,14 @@ def compatible_state_of(simulation):
     return state_of(simulation) | {"u": simulation.field("displacement").astype(float), "angle": angle}
 
 
-def bare_normals(lattice):
+def bare_normals(mesh):
     """{node: outward normal} of the top's sides before the moved part: the mean of those beside the node."""
-    top = np.flatnonzero(edge("top").nodes(lattice))
-    top = top[np.argsort(lattice.nodes[top, 0])]
+    top = np.flatnonzero(edge("top").nodes(mesh))
+    top = top[np.argsort(mesh.nodes[top, 0])]
     normals = {}
     for a, b in itertools.pairwise(top):
-        if lattice.nodes[a, 0] <= 0.62:
-            along = lattice.nodes[b] - lattice.nodes[a]
+        if mesh.nodes[a, 0] <= 0.62:
+            along = mesh.nodes[b] - mesh.nodes[a]
             normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
             for node in (a, b):
                 normals[int(node)] = normals.get(int(node), 0.0) + normal
@@ -111,8 +111,8 @@ def bare_normals(lattice):
 
 
 def model_of(scene):
-    nodes, numerics = scene.lattice.nodes, scene.numerics
-    _, volume = scene.lattice.node_volumes()
+    nodes, numerics = scene.mesh.nodes, scene.numerics
+    _, volume = scene.mesh.node_volumes()
     return {
         "E": MATERIAL.young_modulus,
         "nu": MATERIAL.poisson_ratio,
@@ -125,22 +125,22 @@ def model_of(scene):
         "V0": volume,
         "smoothing_ratio": numerics.smoothing_ratio,
         "h0": numerics.smoothing_ratio * np.sqrt(volume),
-        "cells": scene.lattice.cells,
+        "cells": scene.mesh.cells,
         "kernel": numerics.kernel,
         "scheme": numerics.velocity_scheme,
         "source_scheme": numerics.source_scheme,
         "small_strain": not scene.large_displacements,
         "body_force": GRAVITY,
         "damping": DAMPING,
-        "left": edge("left").nodes(scene.lattice),
-        "bottom": edge("bottom").nodes(scene.lattice),
-        "right": edge("right").nodes(scene.lattice),
-        "top": edge("top").nodes(scene.lattice) & (nodes[:, 0] > 0.62),
+        "left": edge("left").nodes(scene.mesh),
+        "bottom": edge("bottom").nodes(scene.mesh),
+        "right": edge("right").nodes(scene.mesh),
+        "top": edge("top").nodes(scene.mesh) & (nodes[:, 0] > 0.62),
         "top_velocity": footing,
         "x0": nodes,
-        "spacing": min(np.linalg.norm(axes_of(nodes[cell]), axis=1).min() for cell in scene.lattice.cells),
+        "spacing": min(np.linalg.norm(axes_of(nodes[cell]), axis=1).min() for cell in scene.mesh.cells),
         "wave_speed": MATERIAL.wave_speed(2),
-        "bare_normals": bare_normals(scene.lattice),
+        "bare_normals": bare_normals(scene.mesh),
     }
 
 

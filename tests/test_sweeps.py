@@ -5,17 +5,17 @@ import pytest
 import warp as wp
 
 from warpsph import Box, Disc, Elastic, Numerics, Scene, Simulation
-from warpsph.ground.linear_algebra import symmetric_inverse
-from warpsph.ground.materials import LAWS
-from warpsph.ground.precision import PRECISIONS
-from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
-from warpsph.nodes.neighbours import PairList
-from warpsph.nodes.node_sets import node_types
+from warpsph.device.linear_algebra import symmetric_inverse
+from warpsph.device.precision import PRECISIONS
+from warpsph.materials import LAWS
+from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, sweep
 from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
-from warpsph.operators.sweep import CPU_BATCH, GPU_BATCH, sweep
+from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
 from warpsph.scene.material import Elastic as ElasticMaterial
 from warpsph.scene.material import PerzynaVonMises
+from warpsph.state.nodes import node_types
+from warpsph.state.pairs import PairList
 from warpsph.step.fluxes import FLUXES
 from warpsph.step.published import PublishedFluxes
 from warpsph.step.velocity_schemes import VELOCITY_SCHEMES as PUBLISHED_VELOCITIES
@@ -131,7 +131,7 @@ def test_gradients_of_linear_fields_and_values_of_constants_are_exact(precision,
     """On jittered points with uneven volumes, edges and corners included, to rounding times A's condition."""
     rng = np.random.default_rng(3)
     size = CONTINUA[dim].dim + CONTINUA[dim].stress_size
-    nodes = Box((1.0,) * dim, 0.2).lattice()
+    nodes = Box((1.0,) * dim, 0.2).mesh()
     sources = nodes.nodes[nodes.cells].mean(axis=1) + rng.uniform(-0.03, 0.03, size=(len(nodes.cells), dim))
     volumes = rng.uniform(0.8, 1.2, size=len(sources))
     slope, constant = rng.normal(size=(size, dim)), rng.normal(size=size)

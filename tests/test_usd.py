@@ -139,7 +139,7 @@ def test_one_second_of_the_stage_is_one_second_of_the_run(made):
 def test_points_carry_the_fields_of_the_run(made):
     folder, dim = made
     stage, frames = Usd.Stage.Open(str(folder / "live.usdc")), Frames(folder)
-    points, count = material(stage), len(frames.lattice.nodes)
+    points, count = material(stage), len(frames.mesh.nodes)
     ids = points.GetIdsAttr()
     assert ids.GetTypeName() == Sdf.ValueTypeNames.Int64Array and list(ids.Get()) == list(range(count))
     assert points.GetWidthsInterpolation() == "constant"
@@ -158,7 +158,7 @@ def test_points_carry_the_fields_of_the_run(made):
         low, high = in_space(np.array([position.min(axis=0), position.max(axis=0)]))
         extent = np.array(points.GetExtentAttr().Get(frame.number))
         np.testing.assert_allclose(extent, [low - radius, high + radius], atol=1e-6)
-        for k, name in enumerate(frames.lattice.continuum.stress_components):
+        for k, name in enumerate(frames.mesh.continuum.stress_components):
             primvar = primvars.GetPrimvar(f"stress_{name}")
             assert (primvar.GetTypeName(), primvar.GetInterpolation()) == (Sdf.ValueTypeNames.FloatArray, "vertex")
             np.testing.assert_array_equal(primvar.Get(frame.number), frame.stored["stress"][:, k])
@@ -189,7 +189,7 @@ def test_auxiliary_nodes_stand_in_their_cells_and_are_hidden(made):
     stage, frames = Usd.Stage.Open(str(folder / "live.usdc")), Frames(folder)
     points = UsdGeom.Points(stage.GetPrimAtPath("/Run/AuxiliaryNodes"))
     assert points.ComputeVisibility() == "invisible"
-    middle = frames[-1].field("position")[frames.lattice.cells].mean(axis=1)
+    middle = frames[-1].field("position")[frames.mesh.cells].mean(axis=1)
     np.testing.assert_allclose(points.GetPointsAttr().Get(FRAMES), in_space(middle), atol=1e-6)
 
 
@@ -206,7 +206,7 @@ def test_export_colours_by_any_field_over_a_fixed_range(plane, suffix):
         srgb = matplotlib.colormaps["magma"](velocity + 1.0)[:, :3]
         linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
         np.testing.assert_allclose(points.GetDisplayColorAttr().Get(frame.number), linear, atol=0.03)
-    moved = frames.lattice.nodes[:, 1] > 0.45
+    moved = frames.mesh.nodes[:, 1] > 0.45
     top = np.array(points.GetDisplayColorAttr().Get(FRAMES))[moved]
     assert top == pytest.approx(np.tile(top[0], (len(top), 1)))
 

@@ -97,7 +97,7 @@ def plane_wave_errors(spacing, axis, precision):
     )
     simulation = Simulation(scene, device="cpu", precision=precision)
     simulation.run()
-    exact = np.array([pulse(simulation.time - x / speed) for x in scene.lattice.nodes[:, axis]])
+    exact = np.array([pulse(simulation.time - x / speed) for x in scene.mesh.nodes[:, axis]])
     velocity, stress = simulation.field("velocity"), simulation.field("stress")
     across = [k for k in range(3) if k != axis]
     impedance = MATERIAL.density * speed

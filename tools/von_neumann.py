@@ -28,13 +28,13 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from warpsph.device.precision import PRECISIONS
 from warpsph.errors import WarpSPHError
-from warpsph.ground.precision import PRECISIONS
-from warpsph.ground.smoothing import SMOOTHING_FUNCTIONS
-from warpsph.operators.damping import STRESS_SHARE
-from warpsph.operators.shock import STRENGTH
-from warpsph.operators.sweep import EDGE
-from warpsph.scene.dimension import CONTINUA
+from warpsph.mesh.continuum import CONTINUA
+from warpsph.operators.checkerboard import STRESS_SHARE
+from warpsph.operators.front import STRENGTH
+from warpsph.operators.neighbour_sums import EDGE
+from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
 from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
 from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
@@ -57,7 +57,7 @@ def neighbours(dim: int, kernel: str, ratio: float) -> tuple[np.ndarray, np.ndar
 
 
 @dataclass(frozen=True)
-class Lattice:
+class Mesh:
     """An endless lattice of spacing 1 with both sets of nodes.
 
     Args:
@@ -151,23 +151,23 @@ def wave_vectors(dim: int, n: int) -> np.ndarray:
     return np.array(list(itertools.combinations_with_replacement(line, dim)))[1:]
 
 
-def spectral_radius(lattice: Lattice, scheme: str, courant: float, viscosity: float = 0.0, n: int = 17) -> float:
+def spectral_radius(mesh: Mesh, scheme: str, courant: float, viscosity: float = 0.0, n: int = 17) -> float:
     """The largest growth of any wave in one step."""
-    matrices = lattice.step(wave_vectors(lattice.dim, n), scheme, courant, viscosity)
+    matrices = mesh.step(wave_vectors(mesh.dim, n), scheme, courant, viscosity)
     return float(np.abs(np.linalg.eigvals(matrices)).max())
 
 
-def largest_courant(lattice: Lattice, scheme: str, viscosity: float = 0.0, n: int = 17) -> float:
+def largest_courant(mesh: Mesh, scheme: str, viscosity: float = 0.0, n: int = 17) -> float:
     """The Courant number up to which no wave grows, to 10⁻³; 0 when waves grow at any."""
     low, high = 0.0, 2.0
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
-        stable = spectral_radius(lattice, scheme, middle, viscosity, n) <= STABLE
+        stable = spectral_radius(mesh, scheme, middle, viscosity, n) <= STABLE
         low, high = (middle, high) if stable else (low, middle)
     return low
 
 
-def curves(lattice: Lattice, scheme: str, courant: float, kind: str, direction: np.ndarray, per_wave: np.ndarray):
+def curves(mesh: Mesh, scheme: str, courant: float, kind: str, direction: np.ndarray, per_wave: np.ndarray):
     """Phase speed over the exact one and loss of amplitude in an exact period, of a P or S wave.
 
     Along an axis or a diagonal, symmetry keeps a wave's polarisation and the stress that goes with it: its step
@@ -178,25 +178,25 @@ def curves(lattice: Lattice, scheme: str, courant: float, kind: str, direction: 
         per_wave: cells per wavelength (K,).
     """
     number = 2.0 * np.pi / per_wave
-    across = np.eye(lattice.dim)[-1] - direction[-1] * direction
-    if np.linalg.norm(across) < 1e-12 and lattice.dim > 1:
-        across = np.eye(lattice.dim)[0]
+    across = np.eye(mesh.dim)[-1] - direction[-1] * direction
+    if np.linalg.norm(across) < 1e-12 and mesh.dim > 1:
+        across = np.eye(mesh.dim)[0]
     polarisation = direction if kind == "P" else across / np.linalg.norm(across)
-    exact = lattice.rate(direction[None])[0]
+    exact = mesh.rate(direction[None])[0]
     start = np.zeros(len(exact))
-    start[: lattice.dim] = polarisation
+    start[: mesh.dim] = polarisation
     pair = np.stack([start, exact @ start], axis=1)
     speed = float(np.sqrt(-start @ exact @ exact @ start))
-    matrices = lattice.step(number[:, None] * direction, scheme, courant)
+    matrices = mesh.step(number[:, None] * direction, scheme, courant)
     roots = np.linalg.eigvals(np.linalg.pinv(pair) @ matrices @ pair)
     root = np.take_along_axis(roots, np.abs(roots).argmax(axis=1)[:, None], axis=1)[:, 0]
     exact_angle = speed * number * courant
     return np.abs(np.angle(root)) / exact_angle, 1.0 - np.abs(root) ** (2.0 * np.pi / exact_angle)
 
 
-def sheet(lattice: Lattice, path: Path) -> Path:
+def sheet(mesh: Mesh, path: Path) -> Path:
     """Draw dispersion above damping, a column for each wave and direction."""
-    d = lattice.dim
+    d = mesh.dim
     axis, diagonal = np.eye(d)[0], np.ones(d) / np.sqrt(d)
     columns = [("P", "along an axis", axis)]
     if d > 1:
@@ -207,7 +207,7 @@ def sheet(lattice: Lattice, path: Path) -> Path:
     per_wave = np.geomspace(3.0, 60.0, 200)
     for (kind, where, direction), (above, below) in zip(columns, grid.T, strict=True):
         for scheme, (courant, line) in itertools.product(COLOURS, zip(COURANT, LINES, strict=True)):
-            speed, loss = curves(lattice, scheme, courant, kind, direction, per_wave)
+            speed, loss = curves(mesh, scheme, courant, kind, direction, per_wave)
             style = {"color": COLOURS[scheme], "linestyle": line, "linewidth": 1.3}
             above.plot(per_wave, speed, label=f"{scheme}, C = {courant:g}", **style)
             below.plot(per_wave, np.maximum(loss, 1e-7), **style)
@@ -221,8 +221,8 @@ def sheet(lattice: Lattice, path: Path) -> Path:
     grid[1, 0].set_ylabel("loss of amplitude a period")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9 if d > 1 else 7)
-    nu = f", ν = {lattice.poisson_ratio:g}" if d > 1 else ""
-    figure.suptitle(f"{d}D, {lattice.kernel}, h = {lattice.ratio:g} Δx{nu}")
+    nu = f", ν = {mesh.poisson_ratio:g}" if d > 1 else ""
+    figure.suptitle(f"{d}D, {mesh.kernel}, h = {mesh.ratio:g} Δx{nu}")
     figure.savefig(path, dpi=110)
     return path
 
@@ -244,16 +244,16 @@ def main(arguments: list[str] | None = None) -> int:
                 f"--poisson-ratio = {options.poisson_ratio} is not allowed: it must be from 0 to below 0.5"
             )
         numerics = Numerics(kernel=options.kernel, smoothing_ratio=options.smoothing_ratio)
-        lattices = [Lattice(d, numerics.kernel, numerics.smoothing_ratio, options.poisson_ratio) for d in CONTINUA]
-        for lattice in lattices:
-            numerics.check_support(CONTINUA[lattice.dim])
+        meshes = [Mesh(d, numerics.kernel, numerics.smoothing_ratio, options.poisson_ratio) for d in CONTINUA]
+        for mesh in meshes:
+            numerics.check_support(CONTINUA[mesh.dim])
         if options.limits:
-            for lattice, scheme in itertools.product(lattices, VELOCITY_SCHEMES):
-                print(f"{lattice.dim}D {scheme}: {largest_courant(lattice, scheme):.3f}")
+            for mesh, scheme in itertools.product(meshes, VELOCITY_SCHEMES):
+                print(f"{mesh.dim}D {scheme}: {largest_courant(mesh, scheme):.3f}")
             return 0
         options.out.mkdir(parents=True, exist_ok=True)
-        for lattice in lattices:
-            print(sheet(lattice, options.out / f"{lattice.dim}d.png"))
+        for mesh in meshes:
+            print(sheet(mesh, options.out / f"{mesh.dim}d.png"))
     except (WarpSPHError, ValueError, OSError) as error:
         print(f"von_neumann: {error}", file=sys.stderr)
         return 2

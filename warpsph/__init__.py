@@ -18,6 +18,14 @@ A scene is built from named parts and run by a `Simulation`:
 
 __version__ = "0.1.0"
 
+from .analysis.measures import (
+    Sampler,
+    checkerboard_amplitude,
+    fit_band,
+    growth_rate,
+    smallest_distance,
+    trace_ridge,
+)
 from .errors import NonFiniteError, SceneError, WarpSPHError
 from .export.frames import Frames, FrameWriter
 from .scene import (
@@ -54,14 +62,6 @@ from .scene import (
 )
 from .simulation.checkpoint import Checkpoint, write_checkpoint
 from .simulation.history import History
-from .simulation.measures import (
-    Sampler,
-    checkerboard_amplitude,
-    fit_band,
-    growth_rate,
-    smallest_distance,
-    trace_ridge,
-)
 from .simulation.simulation import Observer, Simulation
 
 __all__ = [

@@ -94,7 +94,7 @@ def pairs(neighbours) -> int:
 
 def bytes_per_node_step(simulation: Simulation, phases) -> dict[str, float]:
     """Bytes moved a material node and step, by phase, for those phases that the scene has."""
-    stepper, n = simulation._stepper, len(simulation.lattice.nodes)
+    stepper, n = simulation._stepper, len(simulation.mesh.nodes)
     return {
         phase: times * sum(_size(stepper, name) for name in (*read, *written)) / n
         for phase, (times, read, written) in TRAFFIC.items()
@@ -117,13 +117,13 @@ def _bytes(array: wp.array) -> int:
 def flops_per_node_step(simulation: Simulation) -> float:
     """Floating-point operations of the two sweeps a material node and step; exp and division count as one.
 
-    With p unknowns in d dimensions a pair costs 5d + 4 + 3p + 2pd + 2d² (`warpsph.operators.sweep.collect`), a
+    With p unknowns in d dimensions a pair costs 5d + 4 + 3p + 2pd + 2d² (`warpsph.operators.neighbour_sums`), a
     target's value and gradient 4p + 2pd + 2pd² beside the small inverse. Sources and motion are not counted.
     """
-    stepper, continuum = simulation._stepper, simulation.lattice.continuum
+    stepper, continuum = simulation._stepper, simulation.mesh.continuum
     d, p = continuum.dim, continuum.dim + continuum.stress_size
     entries = pairs(stepper._around_auxiliary) + pairs(stepper._around_nodes)
-    n, m = len(simulation.lattice.nodes), len(simulation.lattice.cells)
+    n, m = len(simulation.mesh.nodes), len(simulation.mesh.cells)
     a_pair = 5 * d + 4 + 3 * p + 2 * p * d + 2 * d * d
     a_target = 4 * p + 2 * p * d + 2 * p * d * d
     return (entries * a_pair + (n + m) * a_target) / n
@@ -133,7 +133,7 @@ def memory_per_node(simulation: Simulation) -> float:
     """Bytes of all Warp arrays of the simulation a material node; what a hash grid holds inside is not seen."""
     found: dict[int, int] = {}
     _collect_arrays(simulation._stepper, found, set())
-    return sum(found.values()) / len(simulation.lattice.nodes)
+    return sum(found.values()) / len(simulation.mesh.nodes)
 
 
 def _collect_arrays(thing, found: dict[int, int], seen: set[int]) -> None:

@@ -31,7 +31,7 @@ def time_case(case: dict, seconds: float) -> dict:
     begin = time.perf_counter()
     simulation = Simulation(scene(case), case.device, case.precision, case.threads)
     ready = time.perf_counter() - begin
-    n = len(simulation.lattice.nodes)
+    n = len(simulation.mesh.nodes)
     result = {"lattice_nodes": n, **timing.time_steps(simulation, seconds), "build_seconds": ready}
     result["node_steps_per_second"] = n / result["seconds_per_step"]
     result["phases"] = phases = timing.time_phases(simulation)

@@ -93,7 +93,7 @@ def _member(case: str, setting: Setting, device: str) -> Result:
         return _failed(case, setting, begin, str(refused))
     except Exception as broken:  # a member must not end the campaign
         return _failed(case, setting, begin, f"{type(broken).__name__}: {broken}")
-    nodes, steps = len(simulation.lattice.nodes), simulation.steps
+    nodes, steps = len(simulation.mesh.nodes), simulation.steps
     if not math.isfinite(error):
         return _failed(case, setting, begin, f"the error is {error}")
     return Result(case, setting, nodes, steps, nodes * steps, wall_time, error)

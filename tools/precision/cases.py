@@ -93,7 +93,7 @@ def _elastic_bar(setting: Setting, device: str):
     """
     transit = 0.005  # of the bar of 1 m [s]
     run = _shipped("elastic_bar", setting, device, duration=TRANSITS * transit, velocity=SMALL)
-    x, t = run.simulation.lattice.nodes[:, 0], run.simulation.time
+    x, t = run.simulation.mesh.nodes[:, 0], run.simulation.time
 
     def pull(at):
         return np.where((at > 0.0) & (at < transit), 1.0, 0.0)
@@ -146,7 +146,7 @@ def _impact(setting: Setting, device: str):
     )
     simulation = Simulation(scene, device=device, precision=setting.precision)
     simulation.run()
-    away = simulation.lattice.nodes[:, 0] - 0.5
+    away = simulation.mesh.nodes[:, 0] - 0.5
     exact = np.where(np.abs(away) < speed * simulation.time, 0.0, -np.sign(away))
     return simulation, float(np.abs(simulation.field("velocity")[:, 0] / (SMALL * speed) - exact).mean())
 

@@ -26,7 +26,7 @@ from ..errors import SceneError, WarpSPHError, one_of
 from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
-from ..scene.validate import instance, listed
+from ..validate import instance, listed
 from .settings import Settings
 
 DEFAULT_NUMERICS = "numerics=default"

@@ -12,8 +12,8 @@ from typing import TypeVar
 
 from ..errors import SceneError, one_of
 from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
-from ..scene.validate import number
 from ..simulation.simulation import Simulation
+from ..validate import number
 from .settings import Settings
 
 Made = TypeVar("Made")
@@ -126,7 +126,7 @@ def _export(options: argparse.Namespace) -> int:
             writer.write_series(frames, path)
     except OSError as error:
         raise SceneError("FILE", options.file, f"it must be a file that can be written ({error})") from None
-    print(f"{path}: {len(frames)} frames, {len(frames.lattice.nodes)} nodes")
+    print(f"{path}: {len(frames)} frames, {len(frames.mesh.nodes)} nodes")
     return 0
 
 

@@ -136,7 +136,7 @@ def _checkpoint(folder: Path, out: str | None) -> Checkpoint:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from .report.command import report  # matplotlib, and all cases: slow to import
+    from ..report.command import report  # matplotlib, and all cases: slow to import
 
     if options.jobs < 1:
         raise SceneError("--jobs", options.jobs, "it must be at least 1")

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from ..errors import SceneError
-from ..simulation.files import write_whole
+from ..storage.files import write_whole
 
 TEMPLATE = Path(__file__).with_name("starting_scene.py")
 

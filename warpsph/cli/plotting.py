@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import SceneError, one_of
-from ..scene.validate import number
+from ..validate import number
 from .exporting import kept_frames
 
 MOVIES = ("gif", "mp4")

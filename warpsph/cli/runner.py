@@ -12,14 +12,14 @@ from typing import Protocol
 
 from .. import __version__
 from ..errors import NonFiniteError, SceneError, StoppedError
+from ..export.plots import plot_field, plot_history
+from ..export.surface_plot import plot_surface
 from ..scene.check import Check
 from ..scene.output import component
 from ..scene.scene import Scene
 from ..simulation.history import History
-from ..simulation.plots import plot_field, plot_history
 from ..simulation.simulation import Observer, Simulation
 from ..simulation.summary import summarise, write_json
-from ..simulation.surface_plot import plot_surface
 from .catalogue import SceneFile
 from .progress import Progress
 from .restart import Restart
@@ -69,7 +69,7 @@ def run(
     store(folder, file, scene, parameters, settings)
     where = simulation.device.alias + (f", {simulation.threads} threads" if simulation.threads > 1 else "")
     say(
-        f"{scene.name}: {len(simulation.lattice.nodes)} nodes, {len(simulation.lattice.cells)} auxiliary nodes, "
+        f"{scene.name}: {len(simulation.mesh.nodes)} nodes, {len(simulation.mesh.cells)} auxiliary nodes, "
         f"{simulation.precision.name} on {where}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )

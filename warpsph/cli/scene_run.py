@@ -36,7 +36,7 @@ class SceneRun:
     def cost(self) -> float:
         """How much work it is, in node-steps."""
         _, scene, _ = self.build()
-        return (len(scene.lattice.nodes) + OVERHEAD) * divide(scene.duration, time_step_limit(scene))[0]
+        return (len(scene.mesh.nodes) + OVERHEAD) * divide(scene.duration, time_step_limit(scene))[0]
 
     def done(self, folder: Path) -> bool:
         """Whether the folder holds this run to its end, by this version, with these parameters.

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
+from ..device.precision import PRECISIONS
 from ..errors import SceneError, one_of
-from ..ground.precision import PRECISIONS
-from ..scene.validate import index, instance, number
+from ..validate import index, instance, number
 
 
 @dataclass(frozen=True)

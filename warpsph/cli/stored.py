@@ -25,8 +25,8 @@ from ..scene.check import Check
 from ..scene.document import decode, encode
 from ..scene.parameter import assign
 from ..scene.scene import Scene
-from ..scene.validate import instance
-from ..simulation.files import write_whole
+from ..storage.files import write_whole
+from ..validate import instance
 from .catalogue import SceneFile, load, load_file
 from .settings import Settings
 

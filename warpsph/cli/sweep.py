@@ -20,12 +20,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..device.precision import precision as precision_of
 from ..errors import SceneError
-from ..ground.precision import precision as precision_of
 from ..scene.parameter import assign
 from ..simulation.checkpoint import CHECKPOINT
 from ..simulation.device import THREADS, all_cores, choose_device, start_warp
-from ..simulation.files import write_whole
+from ..storage.files import write_whole
 from .catalogue import load, shipped
 from .queue import make_missing
 from .restart import SIGNALS

@@ -9,8 +9,8 @@ import matplotlib
 import numpy as np
 
 from ..errors import SceneError, one_of
-from ..simulation.plots import COLOUR_MAP, percentiles, span_of
 from .frames import Frame
+from .plots import COLOUR_MAP, percentiles, span_of
 from .quantity import Quantity
 
 SHADES = 1024

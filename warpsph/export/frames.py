@@ -21,21 +21,21 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ..errors import SceneError, one_of
-from ..scene.lattice import Lattice
+from ..mesh.mesh import Mesh
 from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
-from ..simulation.files import whole
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
+from ..storage.files import whole
 from .walls import Wall, walls_of
 
 FOLDER = "frames"
 STORED = ("displacement", "velocity", "stress", "density", "free_surface")  # and the internal variables
 # Fields that follow from the stored ones; displacement is stored since float32 can not hold it in a position.
 DERIVED = {
-    "position": lambda frame: frame.lattice.nodes + frame.field("displacement"),
-    "strain": lambda frame: green_strain(frame.lattice, frame.field("displacement")),
-    "von_mises_stress": lambda frame: von_mises(frame.field("stress"), frame.lattice.continuum),
-    "mean_stress": lambda frame: mean_stress(frame.field("stress"), frame.lattice.continuum),
+    "position": lambda frame: frame.mesh.nodes + frame.field("displacement"),
+    "strain": lambda frame: green_strain(frame.mesh, frame.field("displacement")),
+    "von_mises_stress": lambda frame: von_mises(frame.field("stress"), frame.mesh.continuum),
+    "mean_stress": lambda frame: mean_stress(frame.field("stress"), frame.mesh.continuum),
 }
 FRAME_FILE = re.compile(r"\d{6}\.npz|\.\d{6}\.part\.npz")
 ROUNDING = 1e-9
@@ -110,8 +110,8 @@ class FrameWriter:
         self._followers = tuple(follow(Frames(run)) for follow in followers)
 
     def _describe(self, simulation: Simulation, rate: float) -> None:
-        lattice, output, walls = simulation.lattice, simulation.scene.output, walls_of(simulation.scene)
-        parts = {name: getattr(lattice, name) for name in Lattice.__dataclass_fields__}
+        mesh, output, walls = simulation.mesh, simulation.scene.output, walls_of(simulation.scene)
+        parts = {name: getattr(mesh, name) for name in Mesh.__dataclass_fields__}
         _save(self._folder / "body.npz", parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
         about = {
             "scene": simulation.scene.name,
@@ -160,7 +160,7 @@ class Frame:
     number: int
     time: float
     step: int
-    lattice: Lattice
+    mesh: Mesh
     stored: Mapping[str, np.ndarray]
 
     def field(self, name: str) -> np.ndarray:
@@ -206,10 +206,10 @@ class Frames(Sequence):
         return _load(self.run / FOLDER / "body.npz")
 
     @cached_property
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         """The initial lattice."""
-        parts = {name: self._body[name] for name in Lattice.__dataclass_fields__}
-        return Lattice(**parts | {"spacing": float(parts["spacing"])})
+        parts = {name: self._body[name] for name in Mesh.__dataclass_fields__}
+        return Mesh(**parts | {"spacing": float(parts["spacing"])})
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:
@@ -248,7 +248,7 @@ class Frames(Sequence):
         """The frame of that number."""
         stored = _load(self.run / FOLDER / f"{number:06d}.npz")
         time, step = float(stored.pop("time")), int(stored.pop("step"))
-        return Frame(number, time, step, self.lattice, stored)
+        return Frame(number, time, step, self.mesh, stored)
 
     def code(self, number: int) -> float:
         """A frame's place on a time line of `rate` codes a second; whole numbers for evenly spaced times."""

@@ -14,10 +14,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import SceneError
-from ..scene.lattice import Lattice
-from ..simulation.files import whole
-from .files import in_space
+from ..mesh.mesh import Mesh
+from ..storage.files import whole
 from .frames import Frame, Frames
+from .vectors import in_space
 
 # Stored components in VTK's order of a symmetric tensor.
 TENSOR = {(0, 0): 0, (1, 1): 1, (2, 2): 2, (0, 1): 3, (1, 2): 4, (0, 2): 5}
@@ -58,20 +58,20 @@ def _body(frame: Frame, fields: tuple[str, ...]):
     body, points = model.vtkPolyData(), core.vtkPoints()
     points.SetData(support.numpy_to_vtk(in_space(frame.field("position")), deep=True))
     body.SetPoints(points)
-    body.SetVerts(_cells(np.arange(len(frame.lattice.nodes))[:, None]))
-    if frame.lattice.dim == 1:
-        body.SetLines(_cells(frame.lattice.cells))
+    body.SetVerts(_cells(np.arange(len(frame.mesh.nodes))[:, None]))
+    if frame.mesh.dim == 1:
+        body.SetLines(_cells(frame.mesh.cells))
     else:
-        body.SetPolys(_cells(_polygons(frame.lattice)))
+        body.SetPolys(_cells(_polygons(frame.mesh)))
     for name in fields:
         if name != "position":
-            body.GetPointData().AddArray(_array(name, frame.field(name), frame.lattice))
+            body.GetPointData().AddArray(_array(name, frame.field(name), frame.mesh))
     return body
 
 
-def _polygons(lattice: Lattice) -> np.ndarray:
+def _polygons(mesh: Mesh) -> np.ndarray:
     """Corners in turn of what can be seen: the cells of a plane body, the faces of a solid."""
-    return (lattice.cells if lattice.dim == 2 else lattice.faces)[:, [0, 1, 3, 2]]
+    return mesh.cells[:, mesh.kind.drawn] if mesh.dim == 2 else mesh.faces[:, mesh.kind.face_kind.drawn]
 
 
 def _cells(corners: np.ndarray):
@@ -87,9 +87,9 @@ def _cells(corners: np.ndarray):
     return cells
 
 
-def _array(name: str, values: np.ndarray, lattice: Lattice):
+def _array(name: str, values: np.ndarray, mesh: Mesh):
     """A field (n, …) as a VTK array: vectors with three components, tensors symmetric with six."""
-    support, tensor = _vtk()[3], lattice.continuum.pairs
+    support, tensor = _vtk()[3], mesh.continuum.pairs
     shown, names = np.asarray(values, dtype=np.float32), ()
     if name in ("stress", "strain"):
         shown, names = np.zeros((len(values), 6), dtype=np.float32), COMPONENTS

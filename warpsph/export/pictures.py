@@ -12,10 +12,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..errors import SceneError
-from ..simulation.files import whole
 from ..simulation.history import read_history
-from ..simulation.plots import BRIGHT, COLOUR_MAP, DARK, DOTS_PER_INCH, axis_label
+from ..storage.files import whole
 from .frames import Frame, Frames
+from .plots import BRIGHT, COLOUR_MAP, DARK, DOTS_PER_INCH, axis_label
 from .quantity import Quantity
 from .view import View
 
@@ -96,7 +96,7 @@ def _lines_and_diagram(view: View, frames: Frames, chosen: Sequence[Frame], figu
     lines.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     time = [frame.time for frame in frames]
     values = np.array([view.quantity(frame) for frame in frames])
-    x = frames.lattice.nodes[:, 0]
+    x = frames.mesh.nodes[:, 0]
     low, high = view.span
     drawn = diagram.pcolormesh(x, time, values, cmap=COLOUR_MAP, shading="nearest", vmin=low, vmax=high)
     diagram.set(xlabel="initial x [m]", ylabel="time [s]")

@@ -29,7 +29,7 @@ class Quantity:
 
     def __call__(self, frame: Frame) -> np.ndarray:
         """Its values at a frame, shape (n,)."""
-        values = frame.field(self.field).reshape(len(frame.lattice.nodes), -1)
+        values = frame.field(self.field).reshape(len(frame.mesh.nodes), -1)
         return np.linalg.norm(values, axis=1) if self.component is None else values[:, self.component]
 
     @property
@@ -49,7 +49,7 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     Raises:
         SceneError: there is no such field or component.
     """
-    continuum, about = frames.lattice.continuum, frames.about
+    continuum, about = frames.mesh.continuum, frames.about
     if text is None:
         parts = component_names(about["field"], continuum)
         part = parts[about["component"]] if parts else ""

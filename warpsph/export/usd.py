@@ -19,11 +19,11 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 
 from .. import __version__
 from ..simulation.fields import component_names
-from ..simulation.files import whole
+from ..storage.files import whole
 from .colours import Colouring, whole_span
-from .files import in_space
 from .frames import Frame, Frames
 from .quantity import quantity
+from .vectors import in_space
 from .walls import WallMesh
 
 ROOT, MATERIAL, AUXILIARY, WALLS = "/Run", "/Run/MaterialNodes", "/Run/AuxiliaryNodes", "/Run/Walls"
@@ -64,15 +64,15 @@ class Drawing:
         self._stage, self._frames, self._colouring = stage, frames, colouring
         self._root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
         self._time = self._root.CreateAttribute("warpsph:time", Sdf.ValueTypeNames.Double)
-        self._nodes = NodePoints(stage, MATERIAL, frames.lattice.spacing)
-        self._cells = NodePoints(stage, AUXILIARY, 0.5 * frames.lattice.spacing)
+        self._nodes = NodePoints(stage, MATERIAL, frames.mesh.spacing)
+        self._cells = NodePoints(stage, AUXILIARY, 0.5 * frames.mesh.spacing)
         self._fields = [name for name in frames.fields if name not in NO_PRIMVARS]
         for name in self._fields:
-            self._nodes.declare(name, component_names(name, frames.lattice.continuum))
+            self._nodes.declare(name, component_names(name, frames.mesh.continuum))
         UsdGeom.Scope.Define(stage, WALLS)
         self._walls = [
             (
-                WallMesh.of(frames.lattice, wall),
+                WallMesh.of(frames.mesh, wall),
                 UsdGeom.Mesh.Define(stage, f"{WALLS}/{wall.name}"),
             )
             for wall in frames.walls
@@ -80,8 +80,8 @@ class Drawing:
 
     def describe(self) -> None:
         """Write what does not change: the stage's units and axes, ids, widths, topology."""
-        stage, lattice, colouring = self._stage, self._frames.lattice, self._colouring
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if lattice.dim == 3 else UsdGeom.Tokens.y)
+        stage, mesh, colouring = self._stage, self._frames.mesh, self._colouring
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if mesh.dim == 3 else UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         stage.SetDefaultPrim(self._root)
         stage.SetTimeCodesPerSecond(self._frames.rate)
@@ -96,32 +96,32 @@ class Drawing:
             }
         }
         Usd.ModelAPI(self._root).SetKind(Kind.Tokens.component)
-        self._nodes.describe(len(lattice.nodes))
-        self._cells.describe(len(lattice.cells))
+        self._nodes.describe(len(mesh.nodes))
+        self._cells.describe(len(mesh.cells))
         UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
-        for mesh, prim in self._walls:
-            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(mesh.polygons), 4, dtype=np.int32)))
-            prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.polygons.astype(np.int32).ravel()))
+        for built, prim in self._walls:
+            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(built.polygons), 4, dtype=np.int32)))
+            prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(built.polygons.astype(np.int32).ravel()))
             prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
             prim.CreateDoubleSidedAttr(True)
             prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([WALL_COLOUR]))
-            if mesh.wall.still:
-                self._set_wall(mesh, prim, lattice.nodes, Usd.TimeCode.Default())
+            if built.wall.still:
+                self._set_wall(built, prim, mesh.nodes, Usd.TimeCode.Default())
 
     def add(self, frame: Frame) -> None:
         """Write a frame at its time code."""
-        code, lattice = Usd.TimeCode(self._frames.code(frame.number)), frame.lattice
+        code, mesh = Usd.TimeCode(self._frames.code(frame.number)), frame.mesh
         self._time.Set(frame.time, code)
         position, velocity = frame.field("position"), frame.field("velocity")
         values = self._colouring.quantity(frame)
         self._nodes.set(position, velocity, self._colouring.linear(values), code)
         for name in self._fields:
             self._nodes.set_field(name, frame.field(name), code)
-        mean = [lattice.at_centres(field) for field in (position, velocity, values)]
+        mean = [mesh.at_centres(field) for field in (position, velocity, values)]
         self._cells.set(*mean[:2], self._colouring.linear(mean[2]), code)
-        for mesh, prim in self._walls:
-            if not mesh.wall.still:
-                self._set_wall(mesh, prim, position, code)
+        for built, prim in self._walls:
+            if not built.wall.still:
+                self._set_wall(built, prim, position, code)
 
     def span_time(self, codes: Sequence[float]) -> None:
         """Say from where to where the time line goes."""
@@ -129,8 +129,8 @@ class Drawing:
             self._stage.SetStartTimeCode(codes[0])
             self._stage.SetEndTimeCode(codes[-1])
 
-    def _set_wall(self, mesh: WallMesh, prim: UsdGeom.Mesh, position: np.ndarray, code: Usd.TimeCode) -> None:
-        points = mesh.points(position).astype(np.float32)
+    def _set_wall(self, built: WallMesh, prim: UsdGeom.Mesh, position: np.ndarray, code: Usd.TimeCode) -> None:
+        points = built.points(position).astype(np.float32)
         prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
         prim.CreateExtentAttr().Set(_extent(points, 0.0), code)
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, Vt
 
-from ..simulation.files import whole
-from ..simulation.plots import percentiles, span_of
+from ..storage.files import whole
 from .colours import Colouring
 from .frames import Frames
+from .plots import percentiles, span_of
 from .quantity import quantity
 from .usd import ROOT, Drawing, write_stage
 

@@ -12,9 +12,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..scene.lattice import Lattice
-from ..simulation.plots import COLOUR_MAP, DARK, beyond, draw_cells, percentiles, span_of
+from ..mesh.mesh import Mesh
 from .frames import Frame, Frames
+from .plots import COLOUR_MAP, DARK, beyond, draw_cells, percentiles, span_of
 from .quantity import Quantity
 
 MARGIN = 0.04
@@ -71,11 +71,11 @@ class View:
             axes.set_ylim(self.values[0] - room, self.values[1] + room)
             axes.grid(alpha=0.3)
         elif len(self.low) == 2:
-            draw_cells(axes, position, values, frame.lattice, self.span, **style)
+            draw_cells(axes, position, values, frame.mesh, self.span, **style)
             axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
         else:
-            colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.lattice, values)))
-            _solid(axes, frame.lattice, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
+            colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.mesh, values)))
+            _solid(axes, frame.mesh, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
             axes.set(
                 xlim=(self.low[0], self.high[0]),
                 ylim=(self.low[1], self.high[1]),
@@ -85,20 +85,19 @@ class View:
 
     def draw_grid(self, axes: Axes, frame: Frame) -> None:
         """Draw the deformed cells over the outline of the initial body, magnified where they hardly move."""
-        displacement, lattice = frame.field("displacement"), frame.lattice
-        scale = magnification(np.linalg.norm(displacement, axis=1).max(), np.ptp(lattice.nodes, axis=0).max())
-        position = lattice.nodes + scale * displacement
+        displacement, mesh = frame.field("displacement"), frame.mesh
+        scale = magnification(np.linalg.norm(displacement, axis=1).max(), np.ptp(mesh.nodes, axis=0).max())
+        position = mesh.nodes + scale * displacement
         if len(self.low) == 3:
-            _solid(axes, lattice, position, facecolors="#e8e8e8", edgecolors=DARK, linewidths=0.3)
+            _solid(axes, mesh, position, facecolors="#e8e8e8", edgecolors=DARK, linewidths=0.3)
             axes.set_box_aspect(np.ptp(position, axis=0))
             axes.set(**{f"{k}lim": (x.min(), x.max()) for k, x in zip("xyz", position.T, strict=True)})
         else:
-            around = position[lattice.cells[:, [0, 1, 3, 2, 0]]]
+            ring = mesh.kind.drawn
+            around = position[mesh.cells[:, (*ring, ring[0])]]
             cut = np.full((len(around), 1, 2), np.nan)
             axes.plot(*np.concatenate([around, cut], axis=1).reshape(-1, 2).T, color=DARK, linewidth=0.4)
-            edges = np.concatenate(
-                [lattice.nodes[lattice.faces], np.full((len(lattice.faces), 1, 2), np.nan)], axis=1
-            )
+            edges = np.concatenate([mesh.nodes[mesh.faces], np.full((len(mesh.faces), 1, 2), np.nan)], axis=1)
             axes.plot(*edges.reshape(-1, 2).T, color=GRID, linewidth=1.0, linestyle="--")
             axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
         axes.set_title(
@@ -127,10 +126,10 @@ def magnification(displacement: float, size: float) -> float:
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted))
 
 
-def _of_faces(lattice: Lattice, values: np.ndarray) -> np.ndarray:
-    return values[lattice.faces].mean(axis=1)
+def _of_faces(mesh: Mesh, values: np.ndarray) -> np.ndarray:
+    return values[mesh.faces].mean(axis=1)
 
 
-def _solid(axes: Axes, lattice: Lattice, position: np.ndarray, **style) -> None:
-    axes.add_collection3d(Poly3DCollection(position[lattice.faces[:, [0, 1, 3, 2]]], **style))
+def _solid(axes: Axes, mesh: Mesh, position: np.ndarray, **style) -> None:
+    axes.add_collection3d(Poly3DCollection(position[mesh.faces[:, mesh.kind.face_kind.drawn]], **style))
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")

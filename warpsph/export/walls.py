@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.mesh import Mesh
 from ..scene.condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
-from ..scene.lattice import Lattice
 from ..scene.scene import Scene
 
 KINDS = {Fixed: "fixed", Roller: "roller", PrescribedVelocity: "moving", Rotating: "rotating"}
@@ -31,19 +31,17 @@ class Wall:
 
 def walls_of(scene: Scene) -> tuple[Wall, ...]:
     """One wall for every condition that holds or moves at least one whole boundary face."""
-    lattice, walls = scene.lattice, []
+    mesh, walls = scene.mesh, []
     for condition in scene.conditions:
-        faces = np.flatnonzero(
-            condition.on.faces(lattice) & condition.on.nodes(lattice)[lattice.faces].all(axis=1)
-        )
+        faces = np.flatnonzero(condition.on.faces(mesh) & condition.on.nodes(mesh)[mesh.faces].all(axis=1))
         if len(faces) and not isinstance(condition, Free):
-            name = _unused(_name(condition, lattice, faces), [wall.name for wall in walls])
+            name = _unused(_name(condition, mesh, faces), [wall.name for wall in walls])
             walls.append(Wall(name, faces, isinstance(condition, Fixed)))
     return tuple(walls)
 
 
-def _name(condition: Condition, lattice: Lattice, faces: np.ndarray) -> str:
-    sides = [lattice.continuum.edges[side] for side in np.unique(lattice.face_side[faces])]
+def _name(condition: Condition, mesh: Mesh, faces: np.ndarray) -> str:
+    sides = [mesh.continuum.edges[side] for side in np.unique(mesh.face_side[faces])]
     return "_".join([KINDS.get(type(condition), "held"), *(sides if len(sides) < len(KINDS) else ["edge"])])
 
 
@@ -63,24 +61,24 @@ class WallMesh:
         polygons: indices into the points, shape (polygons, 4).
     """
 
-    lattice: Lattice
+    mesh: Mesh
     wall: Wall
     polygons: np.ndarray
     _nodes: np.ndarray
     _corner: np.ndarray
 
     @classmethod
-    def of(cls, lattice: Lattice, wall: Wall) -> WallMesh:
+    def of(cls, mesh: Mesh, wall: Wall) -> WallMesh:
         """The mesh of a wall."""
-        nodes, corner = np.unique(lattice.faces[wall.faces], return_inverse=True)
-        corner = corner.reshape(lattice.faces[wall.faces].shape)
-        rings = {1: _plate, 2: _boxes, 3: _quads}[lattice.dim](corner)
-        return cls(lattice, wall, rings, nodes, corner)
+        nodes, corner = np.unique(mesh.faces[wall.faces], return_inverse=True)
+        corner = corner.reshape(mesh.faces[wall.faces].shape)
+        rings = corner[:, mesh.kind.face_kind.drawn] if mesh.dim == 3 else (_plate, _boxes)[mesh.dim - 1](corner)
+        return cls(mesh, wall, rings, nodes, corner)
 
     def points(self, position: np.ndarray) -> np.ndarray:
         """Its points [m], shape (p, 3), for positions (n, d) of the body's nodes."""
-        dim, spacing, own = self.lattice.dim, self.lattice.spacing, position[self._nodes]
-        normals = self.lattice.with_nodes(position).face_normals()[self.wall.faces]
+        dim, spacing, own = self.mesh.dim, self.mesh.spacing, position[self._nodes]
+        normals = self.mesh.with_nodes(position).face_normals()[self.wall.faces]
         outward = np.zeros_like(own)
         np.add.at(outward, self._corner, normals[:, None, :])
         length = np.linalg.norm(outward, axis=1, keepdims=True)
@@ -108,7 +106,3 @@ def _boxes(corner: np.ndarray) -> np.ndarray:
     return np.concatenate(
         [np.stack([a + i * count, a + j * count, b + j * count, b + i * count], 1) for i, j in sides]
     )
-
-
-def _quads(corner: np.ndarray) -> np.ndarray:
-    return corner[:, [0, 1, 3, 2]]

@@ -9,14 +9,14 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.arrays import packed
-from ..ground.compiling import forward_kernel
-from ..ground.launching import Launcher
-from ..ground.linear_algebra import determinant_of
-from ..ground.precision import Precision
-from ..nodes.node_sets import node_types
+from ..device.arrays import packed
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.linear_algebra import determinant_of
+from ..device.precision import Precision
 from ..scene.scene import Scene
-from .cells import cells_of_nodes, edges_function
+from ..state.nodes import node_types
+from .cell_means import cells_of_nodes, edges_function
 from .motion import Motion
 from .spacing import Spacing
 
@@ -33,13 +33,13 @@ class CellMotion(Motion):
 
     def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
         super().__init__(scene, skin, precision, launcher, outdated)
-        device, lattice, continuum = launcher.device, scene.lattice, scene.lattice.continuum
-        self._of_node = wp.array(cells_of_nodes(lattice), dtype=wp.int32, device=device)
-        self._initial_volume = wp.array(lattice.cell_volumes(), dtype=precision.real, device=device)
+        device, mesh, continuum = launcher.device, scene.mesh, scene.mesh.continuum
+        self._of_node = wp.array(cells_of_nodes(mesh), dtype=wp.int32, device=device)
+        self._initial_volume = wp.array(mesh.cell_volumes(), dtype=precision.real, device=device)
         self._ratio = scene.numerics.smoothing_ratio
-        self._cell_h = wp.zeros(len(lattice.cells), dtype=precision.real, device=device)
+        self._cell_h = wp.zeros(len(mesh.cells), dtype=precision.real, device=device)
         self._shift, self._measure, self._share = _kernels(continuum, precision)
-        self._spacing = Spacing(len(lattice.cells), continuum, precision, launcher)
+        self._spacing = Spacing(len(mesh.cells), continuum, precision, launcher)
         self.kernels = (self._shift, self._measure, self._share, *self._spacing.kernels)
 
     def mark(self, nodes, auxiliary) -> None:

@@ -1,6 +1,6 @@
-"""Boundary conditions on the material nodes, as resolved by `warpsph.scene.boundary`.
+"""Boundary conditions on the material nodes, as resolved by `warpsph.scene.resolve`.
 
-Edges given by selection are all in here; a free surface that moves is added by `warpsph.operators.free_surface`.
+Edges given by selection are all in here; one that moves is added by `warpsph.operators.surface`.
 """
 
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from ..ground.compiling import forward_kernel
-from ..ground.kinematics import kinematics
-from ..ground.launching import Launcher
-from ..ground.linear_algebra import rotation_of
-from ..ground.precision import Precision
-from ..ground.unknowns import unknowns
-from ..nodes.node_sets import NodeTypes, node_types
-from ..scene.boundary import BoundaryTable
-from ..scene.dimension import Continuum
-from .clock import END, Clock
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.linear_algebra import rotation_of
+from ..device.precision import Precision
+from ..mesh.continuum import Continuum
+from ..physics.stress import kinematics
+from ..physics.unknowns import unknowns
+from ..scene.resolve import BoundaryTable
+from ..state.clock import END, Clock
+from ..state.nodes import NodeTypes, node_types
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,15 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from ..ground.compiling import forward_kernel
-from ..ground.launching import Launcher
-from ..ground.linear_algebra import determinant_of
-from ..ground.precision import Precision
-from ..ground.unknowns import unknowns
-from ..nodes.node_sets import node_types
-from ..scene.dimension import Continuum
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.linear_algebra import determinant_of
+from ..device.precision import Precision
+from ..mesh.continuum import Continuum
+from ..physics.unknowns import unknowns
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
+from ..state.nodes import node_types
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Motion:
     """
 
     def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
-        device, continuum, n = launcher.device, scene.lattice.continuum, len(scene.lattice.nodes)
+        device, continuum, n = launcher.device, scene.mesh.continuum, len(scene.mesh.nodes)
         types = node_types(continuum, precision)
         self._support, self._skin = KERNELS[scene.numerics.kernel].support, skin
         self._reference_density = scene.material.density

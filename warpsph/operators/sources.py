@@ -14,16 +14,16 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.compiling import forward_kernel
-from ..ground.kinematics import kinematics
-from ..ground.launching import Launcher
-from ..ground.linear_algebra import rotation_of
-from ..ground.materials.law import Law
-from ..ground.precision import Precision
-from ..ground.unknowns import unknowns
-from ..nodes.node_sets import node_types
-from ..scene.dimension import Continuum
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.linear_algebra import rotation_of
+from ..device.precision import Precision
+from ..materials.law import Law
+from ..mesh.continuum import Continuum
+from ..physics.stress import kinematics
+from ..physics.unknowns import unknowns
 from ..scene.scene import Scene
+from ..state.nodes import node_types
 
 # RK4 is stable up to 2.785 (METHOD section 3), where it no longer damps at all; half of that follows the
 # exponential to 10 %, and no sub-step overshoots the yield surface.
@@ -51,7 +51,7 @@ class Sources:
     """
 
     def __init__(self, scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher, integrator):
-        continuum = scene.lattice.continuum
+        continuum = scene.mesh.continuum
         self._parameters, self._launcher = parameters, launcher
         self._damping = scene.damping
         flows, turns = law.flow is not None, spins(scene)
@@ -78,7 +78,7 @@ class Sources:
 
 def spins(scene: Scene) -> bool:
     """Whether stresses turn with the nodes: not in a bar, not at small displacements."""
-    return scene.large_displacements and scene.lattice.dim > 1
+    return scene.large_displacements and scene.mesh.dim > 1
 
 
 def sources(scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher) -> Sources | NoSources:

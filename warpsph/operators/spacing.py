@@ -10,13 +10,13 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.compiling import forward_kernel
-from ..ground.launching import Launcher
-from ..ground.precision import Precision
-from ..ground.reduction import LargestMagnitude
-from ..nodes.node_sets import node_types
-from ..scene.dimension import Continuum
-from .cells import edges_function, frame_function
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.precision import Precision
+from ..device.reduction import LargestMagnitude
+from ..mesh.continuum import Continuum
+from ..state.nodes import node_types
+from .cell_means import edges_function, frame_function
 
 # A step is not shortened beyond this share, or a run in which cells fold would never end.
 SMALLEST = 0.25

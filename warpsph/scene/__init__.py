@@ -1,16 +1,15 @@
 """Scene description: what a user writes. No Warp in here."""
 
-from .boundary import BoundaryTable
+from ..mesh.continuum import BAR, CONTINUA, PLANE_STRAIN, SOLID, Continuum
 from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
-from .dimension import BAR, CONTINUA, PLANE_STRAIN, SOLID, Continuum
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
-from .lattice import Lattice
 from .material import Elastic, PerzynaVonMises
 from .numerics import KERNELS, PUBLISHED, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
 from .parameter import Parameter
+from .resolve import BoundaryTable
 from .scene import BodyForce, Scene
 from .selection import edge, everywhere, region, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
@@ -36,7 +35,6 @@ __all__ = [
     "Fixed",
     "Free",
     "FreeSurface",
-    "Lattice",
     "Linear",
     "Mapped",
     "NodeValue",

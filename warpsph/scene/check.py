@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Real
 
 from ..errors import SceneError
-from .validate import instance, number
+from ..validate import instance, number
 
 
 @dataclass(frozen=True)

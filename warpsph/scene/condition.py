@@ -3,7 +3,7 @@
 Every condition prescribes, direction by direction, either the velocity or the traction. A `Free` edge
 prescribes all tractions (zero); `Fixed` all velocities (zero); a `Roller` the normal velocity and the
 tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and zero traction
-along the others. What happens where conditions meet is in `warpsph.scene.boundary`.
+along the others. What happens where conditions meet is in `warpsph.scene.resolve`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
+from ..validate import TimeFunction, instance, number, time_function, vector
 from .selection import Selection
-from .validate import TimeFunction, instance, number, time_function, vector
 
 # One prescribed direction at every selected node: the unit vectors (k, d), and the target velocity along them
 # as a sum of terms, each a coefficient a node (k,) times a function of time.

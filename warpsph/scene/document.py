@@ -16,6 +16,7 @@ from functools import cache
 import numpy as np
 
 from ..errors import SceneError, one_of
+from ..validate import choice
 from .condition import Condition, EdgeCondition
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
@@ -25,7 +26,6 @@ from .output import EdgeForce, NodeValue, Output, Probe
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
 from .shape import Mapped, Placed, Shape
-from .validate import choice
 
 FREE = "free"
 SELECTIONS = ("on", "first", "second", "inner")  # fields in which a text is the name of an edge
@@ -80,9 +80,9 @@ def _encode(value: object, path: str, scene: Scene, arrays: dict) -> object:
     if isinstance(value, tuple | list):
         return [_encode(part, f"{path}.{k}", scene, arrays) for k, part in enumerate(value)]
     if isinstance(value, Mapped):
-        value = Placed(value.shape, value.lattice().nodes)
+        value = Placed(value.shape, value.mesh().nodes)
     if isinstance(value, where):
-        value = chosen(np.flatnonzero(value.nodes(scene.lattice)))
+        value = chosen(np.flatnonzero(value.nodes(scene.mesh)))
     if isinstance(value, edge):
         return value.name
     if isinstance(value, np.ndarray):

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..validate import TimeFunction
 from .scene import Scene
-from .validate import TimeFunction
 
 # Functions of time may be any code: they are compared by their values at so many times.
 SAMPLES = 257
@@ -31,9 +31,9 @@ def fingerprint(scene: Scene) -> str:
 
 
 def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
-    lattice, boundary, output = scene.lattice, scene.boundary, scene.output
+    mesh, boundary, output = scene.mesh, scene.boundary, scene.output
     times = np.linspace(0.0, scene.duration, SAMPLES).tolist()
-    yield from (("nodes", lattice.nodes), ("cells", lattice.cells), ("faces", lattice.faces))
+    yield from (("nodes", mesh.nodes), ("cells", mesh.cells), ("faces", mesh.faces))
     for name in ("nodes", "velocity_projector", "stress_projector", "amplitude", "function", "moved"):
         yield f"boundary.{name}", getattr(boundary, name)
     yield "boundary.functions", np.array([_sample(function, times) for function in boundary.functions])

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from .boundary import BoundaryTable
-from .lattice import Lattice
-from .validate import choice, number
+from ..mesh.mesh import Mesh
+from ..validate import choice, number
+from .resolve import BoundaryTable
 
 NORMALS = ("improved", "marrone")
 LARGEST_SCAN = 2.0
@@ -21,7 +21,7 @@ class FreeSurface:
     """Makes the body's edge traction-free wherever no velocity is prescribed, as it moves and deforms.
 
     Surface nodes and their normals are found anew in the current configuration (see
-    `warpsph.operators.surface_scan`), unlike those of `Free`, whose initial normals turn with their nodes'
+    `warpsph.operators.surface.scan`), unlike those of `Free`, whose initial normals turn with their nodes'
     spin (with a published velocity scheme they do not).
 
     Args:
@@ -47,18 +47,18 @@ class FreeSurface:
         least = math.sqrt(dim / 2.0)
         number("FreeSurface.scan_ratio", self.scan_ratio, at_least=least, at_most=LARGEST_SCAN)
 
-    def candidates(self, lattice: Lattice, boundary: BoundaryTable) -> np.ndarray:
+    def candidates(self, mesh: Mesh, boundary: BoundaryTable) -> np.ndarray:
         """The nodes that can be on the free surface, indices, shape (b,), ascending.
 
         They are the nodes of the boundary faces that no velocity condition covers. The body can not tear, as
         auxiliary nodes stay in the middle of their initial cells, so no other node ever gets there. A node
         at the end of a wall is one of them: it belongs to the free surface as well.
         """
-        moved = self.moved(lattice, boundary)
-        return np.unique(lattice.faces[~moved[lattice.faces].all(axis=1)])
+        moved = self.moved(mesh, boundary)
+        return np.unique(mesh.faces[~moved[mesh.faces].all(axis=1)])
 
-    def moved(self, lattice: Lattice, boundary: BoundaryTable) -> np.ndarray:
+    def moved(self, mesh: Mesh, boundary: BoundaryTable) -> np.ndarray:
         """Which nodes are under a velocity condition, boolean, shape (n,)."""
-        moved = np.zeros(len(lattice.nodes), dtype=bool)
+        moved = np.zeros(len(mesh.nodes), dtype=bool)
         moved[boundary.nodes] = boundary.moved
         return moved

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from .validate import listed, number
+from ..validate import listed, number
 
 
 @dataclass(frozen=True)

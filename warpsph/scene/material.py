@@ -1,4 +1,4 @@
-"""Materials a user can name. The laws themselves are in `warpsph.ground.materials`."""
+"""Materials a user can name. The laws themselves are in `warpsph.materials`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .dimension import Continuum
-from .validate import number
+from ..mesh.continuum import Continuum
+from ..validate import number
 
 
 @dataclass(frozen=True, kw_only=True)

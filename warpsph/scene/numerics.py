@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import SceneError
-from .dimension import Continuum
-from .validate import choice, number
+from ..mesh.continuum import Continuum
+from ..validate import choice, number
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
+from ..validate import choice, index, instance, listed, number, vector
 from .selection import Selection
-from .validate import choice, index, instance, listed, number, vector
 
 
 @dataclass(frozen=True)
@@ -81,15 +81,15 @@ class EdgeForce:
         index("EdgeForce.axis", self.axis)
 
     def __call__(self, simulation) -> float:
-        lattice, continuum = simulation.lattice, simulation.lattice.continuum
+        mesh, continuum = simulation.mesh, simulation.mesh.continuum
         index("EdgeForce.axis", self.axis, below=continuum.dim)
-        chosen = self.on.nodes(lattice)[lattice.faces].all(axis=1) & self.on.faces(lattice)
+        chosen = self.on.nodes(mesh)[mesh.faces].all(axis=1) & self.on.faces(mesh)
         if not chosen.any():
             raise SceneError("EdgeForce.on", self.on, "it must hold all nodes of at least one boundary face")
-        current = lattice.with_nodes(simulation.field("position"))
+        current = mesh.with_nodes(simulation.field("position"))
         normals = current.face_normals()[chosen]
-        area = face_areas(current.nodes[lattice.faces[chosen]])
-        stress = simulation.field("stress")[lattice.faces[chosen]].mean(axis=1)
+        area = current.face_areas()[chosen]
+        stress = simulation.field("stress")[mesh.faces[chosen]].mean(axis=1)
         traction = np.zeros(len(normals))
         for k, (i, j) in enumerate(continuum.pairs):
             if max(i, j) < continuum.dim:
@@ -98,16 +98,6 @@ class EdgeForce:
                 if j == self.axis and i != j:
                     traction += stress[:, k] * normals[:, i]
         return float(-(traction * area).sum())
-
-
-def face_areas(points: np.ndarray) -> np.ndarray:
-    """Area of faces given by their corner positions, shape (f, 1, 2 or 4, d): 1, length, or quadrilateral."""
-    if points.shape[1] == 1:
-        return np.ones(len(points))
-    if points.shape[1] == 2:
-        return np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-    diagonals = np.cross(points[:, 3] - points[:, 0], points[:, 2] - points[:, 1])
-    return 0.5 * np.linalg.norm(diagonals, axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
+from ..validate import instance, number
 from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
-from .validate import instance, number
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import SceneError
-from .boundary import BoundaryTable, resolve
-from .condition import Condition, Free
-from .free_surface import FreeSurface
-from .lattice import Lattice
-from .material import Elastic
-from .numerics import Numerics
-from .output import Output
-from .selection import Bare
-from .shape import Shape
-from .validate import (
+from ..mesh.mesh import Mesh
+from ..validate import (
     TimeFunction,
     field_of_position,
     flag,
@@ -28,6 +20,14 @@ from .validate import (
     time_function,
     vector,
 )
+from .condition import Condition, Free
+from .free_surface import FreeSurface
+from .material import Elastic
+from .numerics import Numerics
+from .output import Output
+from .resolve import BoundaryTable, resolve
+from .selection import Bare
+from .shape import Shape
 
 
 @dataclass(frozen=True)
@@ -119,56 +119,56 @@ class Scene:
         )
         for index, condition in enumerate(self.conditions):
             instance(f"conditions[{index}]", condition, Condition, "a condition such as Fixed(edge('left'))")
-        dim = self.lattice.dim
+        dim = self.mesh.dim
         if self.body_force is not None:
             instance("body_force", self.body_force, BodyForce, "BodyForce(…) or None")
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
         if self.free_surface is not None:
             self._check_free_surface()
-        stretch = self.lattice.largest_edge() / self.lattice.spacing
-        self.numerics.check_support(self.lattice.continuum, 1.0 if self.numerics.follows_cells else stretch)
+        stretch = self.mesh.largest_edge() / self.mesh.spacing
+        self.numerics.check_support(self.mesh.continuum, 1.0 if self.numerics.follows_cells else stretch)
         _ = self.boundary, self.initial_velocity, self.initial_stress
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
-        surface.check(self.lattice.dim)
+        surface.check(self.mesh.dim)
         for index, condition in enumerate(self.conditions):
             if isinstance(condition, Free):
                 allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
-        if not len(surface.candidates(self.lattice, self.boundary)):
+        if not len(surface.candidates(self.mesh, self.boundary)):
             raise SceneError(
                 "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
             )
 
     @cached_property
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         """The initial nodes, cells and faces."""
-        return self.shape.lattice()
+        return self.shape.mesh()
 
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
         if not self.numerics.unloads:
-            return resolve(self.lattice, self.conditions)
+            return resolve(self.mesh, self.conditions)
         conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
-        if self.free_surface is None and bare.faces(self.lattice).any():
+        if self.free_surface is None and bare.faces(self.mesh).any():
             conditions = (*conditions, Free(bare))
-        return resolve(self.lattice, conditions, self.material.stiffness(self.lattice.continuum))
+        return resolve(self.mesh, conditions, self.material.stiffness(self.mesh.continuum))
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:
         """[m/s], shape (n, d)."""
-        return self._initial("velocity", self.velocity, self.lattice.dim)
+        return self._initial("velocity", self.velocity, self.mesh.dim)
 
     @cached_property
     def initial_stress(self) -> np.ndarray:
         """[Pa], shape (n, s)."""
-        return self._initial("stress", self.stress, self.lattice.continuum.stress_size)
+        return self._initial("stress", self.stress, self.mesh.continuum.stress_size)
 
     def _initial(self, name: str, function: Callable | None, size: int) -> np.ndarray:
         if function is None:
-            return np.zeros((len(self.lattice.nodes), size))
+            return np.zeros((len(self.mesh.nodes), size))
         if not callable(function):
             raise SceneError(name, function, "it must be a function of position f(x, y, …) or None")
-        return field_of_position(name, function, self.lattice.nodes, size)
+        return field_of_position(name, function, self.mesh.nodes, size)

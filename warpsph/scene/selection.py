@@ -13,20 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from .lattice import Lattice
-from .validate import choice, field_of_position, index, vector
+from ..mesh.mesh import Mesh
+from ..validate import choice, field_of_position, index, vector
 
 
 class Selection:
     """A set of nodes; combine with `&`, `|` and `~`."""
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
+    def nodes(self, mesh: Mesh) -> np.ndarray:
         """Which nodes are selected, boolean, shape (n,)."""
         raise NotImplementedError
 
-    def faces(self, lattice: Lattice) -> np.ndarray:
+    def faces(self, mesh: Mesh) -> np.ndarray:
         """Which boundary faces may give a normal, boolean, shape (f,)."""
-        return np.ones(len(lattice.faces), dtype=bool)
+        return np.ones(len(mesh.faces), dtype=bool)
 
     def __and__(self, other: Selection) -> Selection:
         return Both(self, other)
@@ -45,22 +45,22 @@ class edge(Selection):  # noqa: N801 - written as a word in scenes
     Names refer to the axes of the lattice before it was rotated or mapped.
 
     >>> from warpsph import Box
-    >>> edge("left").nodes(Box((1.0,), 0.5).lattice())
+    >>> edge("left").nodes(Box((1.0,), 0.5).mesh())
     array([ True, False, False])
     """
 
     name: str
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        mask = np.zeros(len(lattice.nodes), dtype=bool)
-        mask[lattice.faces[self.faces(lattice)]] = True
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        mask = np.zeros(len(mesh.nodes), dtype=bool)
+        mask[mesh.faces[self.faces(mesh)]] = True
         return mask
 
-    def faces(self, lattice: Lattice) -> np.ndarray:
-        names = lattice.continuum.edges
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        names = mesh.continuum.edges
         if choice("edge", self.name, (*names, "boundary")) == "boundary":
-            return np.ones(len(lattice.faces), dtype=bool)
-        return lattice.face_side == names.index(self.name)
+            return np.ones(len(mesh.faces), dtype=bool)
+        return mesh.face_side == names.index(self.name)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class region(Selection):  # noqa: N801
         lower, upper: opposite corners [m].
 
     >>> from warpsph import Box
-    >>> region((0.4,), (1.0,)).nodes(Box((1.0,), 0.5).lattice())
+    >>> region((0.4,), (1.0,)).nodes(Box((1.0,), 0.5).mesh())
     array([False,  True,  True])
     """
 
@@ -86,12 +86,12 @@ class region(Selection):  # noqa: N801
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        if len(self.lower) != lattice.dim:
-            raise SceneError("region.lower", self.lower, f"the shape has {lattice.dim} dimension(s)")
-        slack = 1e-6 * lattice.spacing
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        if len(self.lower) != mesh.dim:
+            raise SceneError("region.lower", self.lower, f"the shape has {mesh.dim} dimension(s)")
+        slack = 1e-6 * mesh.spacing
         low, high = np.array(self.lower) - slack, np.array(self.upper) + slack
-        return ((lattice.nodes >= low) & (lattice.nodes <= high)).all(axis=1)
+        return ((mesh.nodes >= low) & (mesh.nodes <= high)).all(axis=1)
 
 
 @dataclass(frozen=True)
@@ -101,16 +101,16 @@ class where(Selection):  # noqa: N801
     Coordinates are rounded to 12 digits of the body's extent, so that `x <= 0.3` holds on a node at 0.3.
 
     >>> from warpsph import Box
-    >>> (where(lambda x: x > 0.4) & ~edge("right")).nodes(Box((1.0,), 0.5).lattice())
+    >>> (where(lambda x: x > 0.4) & ~edge("right")).nodes(Box((1.0,), 0.5).mesh())
     array([False,  True, False])
     """
 
     function: Callable
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        extent = max(np.abs(lattice.nodes).max(), lattice.spacing)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        extent = max(np.abs(mesh.nodes).max(), mesh.spacing)
         decimals = 12 - int(np.ceil(np.log10(extent)))
-        points = np.round(lattice.nodes, decimals)
+        points = np.round(mesh.nodes, decimals)
         return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
 
 
@@ -126,8 +126,8 @@ class chosen(Selection):  # noqa: N801
             raise SceneError("chosen.numbers", self.numbers, "it must be a sequence of whole numbers")
         object.__setattr__(self, "numbers", numbers)
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        mask = np.zeros(len(lattice.nodes), dtype=bool)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        mask = np.zeros(len(mesh.nodes), dtype=bool)
         for number in (self.numbers.min(initial=0), self.numbers.max(initial=0)):
             index("chosen.numbers", number, below=len(mask))
         mask[self.numbers] = True
@@ -138,8 +138,8 @@ class chosen(Selection):  # noqa: N801
 class everywhere(Selection):  # noqa: N801
     """All nodes."""
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        return np.ones(len(lattice.nodes), dtype=bool)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        return np.ones(len(mesh.nodes), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -152,11 +152,11 @@ class Both(Selection):
     def __post_init__(self):
         _selection(self.first), _selection(self.second)
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        return self.first.nodes(lattice) & self.second.nodes(lattice)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        return self.first.nodes(mesh) & self.second.nodes(mesh)
 
-    def faces(self, lattice: Lattice) -> np.ndarray:
-        return self.first.faces(lattice) & self.second.faces(lattice)
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        return self.first.faces(mesh) & self.second.faces(mesh)
 
 
 @dataclass(frozen=True)
@@ -169,11 +169,11 @@ class Either(Selection):
     def __post_init__(self):
         _selection(self.first), _selection(self.second)
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        return self.first.nodes(lattice) | self.second.nodes(lattice)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        return self.first.nodes(mesh) | self.second.nodes(mesh)
 
-    def faces(self, lattice: Lattice) -> np.ndarray:
-        return self.first.faces(lattice) | self.second.faces(lattice)
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        return self.first.faces(mesh) | self.second.faces(mesh)
 
 
 @dataclass(frozen=True)
@@ -185,8 +185,8 @@ class Outside(Selection):
     def __post_init__(self):
         _selection(self.inner)
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        return ~self.inner.nodes(lattice)
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        return ~self.inner.nodes(mesh)
 
 
 @dataclass(frozen=True)
@@ -199,15 +199,15 @@ class Bare(Selection):
 
     covering: tuple[Selection, ...]
 
-    def nodes(self, lattice: Lattice) -> np.ndarray:
-        mask = np.zeros(len(lattice.nodes), dtype=bool)
-        mask[lattice.faces[self.faces(lattice)]] = True
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        mask = np.zeros(len(mesh.nodes), dtype=bool)
+        mask[mesh.faces[self.faces(mesh)]] = True
         return mask
 
-    def faces(self, lattice: Lattice) -> np.ndarray:
-        bare = np.ones(len(lattice.faces), dtype=bool)
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        bare = np.ones(len(mesh.faces), dtype=bool)
         for selection in self.covering:
-            bare &= ~(selection.faces(lattice) & selection.nodes(lattice)[lattice.faces].all(axis=1))
+            bare &= ~(selection.faces(mesh) & selection.nodes(mesh)[mesh.faces].all(axis=1))
         return bare
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from .lattice import Lattice, grid_lattice
-from .validate import field_of_position, instance, number, vector
+from ..mesh.lattice import grid_lattice
+from ..mesh.mesh import Mesh
+from ..validate import field_of_position, instance, number, vector
 
 
 class Shape:
     """A body's shape with its lattice spacing; subclasses implement `lattice`."""
 
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         """The initial nodes, cells and boundary faces."""
         raise NotImplementedError
 
@@ -54,7 +55,7 @@ class Box(Shape):
         spacing: distance between neighbouring nodes Δx [m].
         origin: low corner [m]; zero unless given.
 
-    >>> Box(size=(2.0, 1.0), spacing=0.5).lattice().nodes.shape
+    >>> Box(size=(2.0, 1.0), spacing=0.5).mesh().nodes.shape
     (15, 2)
     """
 
@@ -81,7 +82,7 @@ class Box(Shape):
         for name, value in (("size", size), ("spacing", spacing), ("origin", origin)):
             object.__setattr__(self, name, value)
 
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         size = np.array(self.size)
         cells = np.rint(size / self.spacing).astype(int)
         return grid_lattice(np.ones(cells, dtype=bool), self.spacing, np.array(self.origin), size)
@@ -98,7 +99,7 @@ class Disc(Shape):
         spacing: Δx [m].
         centre: centre [m].
 
-    >>> len(Disc(radius=1.0, spacing=0.5).lattice().cells)
+    >>> len(Disc(radius=1.0, spacing=0.5).mesh().cells)
     12
     """
 
@@ -112,7 +113,7 @@ class Disc(Shape):
         object.__setattr__(self, "centre", vector("centre", self.centre, 2))
         _limit_cells((2 * self.radius,) * 2, self.spacing)
 
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         centre = np.array(self.centre)
         half = 0.5 * self.spacing * math.ceil(2.0 * self.radius / self.spacing - 1e-9)  # centres the lattice
         return _cut(
@@ -131,7 +132,7 @@ class Polygon(Shape):
         vertices: corners in order [m], three or more (x, y) pairs.
         spacing: Δx [m].
 
-    >>> Polygon([(0, 0), (2, 0), (0, 2)], spacing=1.0).lattice().cells.shape
+    >>> Polygon([(0, 0), (2, 0), (0, 2)], spacing=1.0).mesh().cells.shape
     (1, 4)
     """
 
@@ -150,7 +151,7 @@ class Polygon(Shape):
         corners = np.array(vertices)
         _limit_cells(corners.max(axis=0) - corners.min(axis=0), self.spacing)
 
-    def lattice(self) -> Lattice:
+    def mesh(self) -> Mesh:
         corners = np.array(self.vertices)
         return _cut(lambda p: _inside_polygon(p, corners), corners.min(axis=0), corners.max(axis=0), self.spacing)
 
@@ -166,8 +167,8 @@ class Mapped(Shape):
         instance("mapped.shape", self.shape, Shape, "a shape")
         instance("mapped.function", self.function, Callable, "a function of position")
 
-    def lattice(self) -> Lattice:
-        start = self.shape.lattice()
+    def mesh(self) -> Mesh:
+        start = self.shape.mesh()
         nodes = field_of_position("mapped.function", self.function, start.nodes, start.dim)
         return _unfolded(start.with_nodes(nodes), "mapped.function", self.function)
 
@@ -187,8 +188,8 @@ class Placed(Shape):
     def __post_init__(self):
         instance("Placed.shape", self.shape, Shape, "a shape")
 
-    def lattice(self) -> Lattice:
-        start = self.shape.lattice()
+    def mesh(self) -> Mesh:
+        start = self.shape.mesh()
         try:
             nodes = np.array(self.nodes, dtype=float)
         except (TypeError, ValueError):
@@ -198,10 +199,10 @@ class Placed(Shape):
         return _unfolded(start.with_nodes(nodes), "Placed.nodes", self.nodes)
 
 
-def _unfolded(lattice: Lattice, field: str, value: object) -> Lattice:
-    if lattice.cell_volumes().min() <= 0.0:
+def _unfolded(mesh: Mesh, field: str, value: object) -> Mesh:
+    if mesh.cell_volumes().min() <= 0.0:
         raise SceneError(field, value, "it must keep every cell's volume positive (no folds)")
-    return lattice
+    return mesh
 
 
 LARGEST_LATTICE = 10**9
@@ -215,7 +216,7 @@ def _limit_cells(size, spacing: float) -> None:
         )
 
 
-def _cut(inside: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, spacing: float) -> Lattice:
+def _cut(inside: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, spacing: float) -> Mesh:
     """Lattice of the cells of a grid over the box (low, high) whose centres are inside."""
     cells = np.maximum(1, np.ceil((high - low) / spacing - 1e-9).astype(int))
     axes = [low[k] + spacing * (np.arange(cells[k]) + 0.5) for k in range(len(low))]

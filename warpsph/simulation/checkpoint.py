@@ -16,7 +16,7 @@ import numpy as np
 from .. import __version__
 from ..errors import SceneError
 from ..scene.fingerprint import fingerprint
-from .files import write_whole
+from ..storage.files import write_whole
 from .history import History
 from .simulation import Simulation
 

@@ -9,9 +9,9 @@ import tempfile
 
 import warp as wp
 
+from ..device.compiling import use_temporary_cache
 from ..errors import SceneError
-from ..ground.compiling import use_temporary_cache
-from ..scene.validate import index
+from ..validate import index
 
 NODES_A_THREAD = 1000  # with fewer, threads wait for each other longer than they work
 THREADS = "WARPSPH_THREADS"  # the environment variable that says how many a process may use

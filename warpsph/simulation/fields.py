@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ground.materials import law
-from ..ground.precision import PRECISIONS
-from ..scene.dimension import Continuum
-from ..scene.lattice import Lattice
+from ..device.precision import PRECISIONS
+from ..materials import law
+from ..mesh.continuum import Continuum
+from ..mesh.mesh import Mesh
 from ..scene.material import PerzynaVonMises
 from ..scene.scene import Scene
 
@@ -47,7 +47,7 @@ def _phi(simulation) -> np.ndarray:
 
 
 def _stress(simulation) -> np.ndarray:
-    return _phi(simulation)[:, simulation.lattice.dim :].copy()
+    return _phi(simulation)[:, simulation.mesh.dim :].copy()
 
 
 def _yield_size(simulation) -> np.ndarray:
@@ -71,7 +71,7 @@ def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
     return sum(stress[:, k] for k, (i, j) in enumerate(continuum.pairs) if i == j) / 3.0
 
 
-def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
+def green_strain(mesh: Mesh, displacement: np.ndarray) -> np.ndarray:
     """Green-Lagrange strain E = (H + Hᵀ + HᵀH)/2, H = ∂u/∂X, shape (n, s): the mean over a node's cells.
 
     In the components and the order of the stored stresses; E33 of plane strain is zero.
@@ -80,14 +80,14 @@ def green_strain(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
         lattice: the initial lattice.
         displacement: of the nodes [m], shape (n, d).
     """
-    H = lattice.cell_gradients(displacement)
+    H = mesh.cell_gradients(displacement)
 
     def part(i: int, j: int) -> np.ndarray:
-        if max(i, j) >= lattice.dim:
+        if max(i, j) >= mesh.dim:
             return np.zeros(len(H))
-        return 0.5 * (H[:, i, j] + H[:, j, i] + sum(H[:, k, i] * H[:, k, j] for k in range(lattice.dim)))
+        return 0.5 * (H[:, i, j] + H[:, j, i] + sum(H[:, k, i] * H[:, k, j] for k in range(mesh.dim)))
 
-    return lattice.at_nodes(np.stack([part(i, j) for i, j in lattice.continuum.pairs], axis=1))
+    return mesh.at_nodes(np.stack([part(i, j) for i, j in mesh.continuum.pairs], axis=1))
 
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
@@ -103,17 +103,17 @@ def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
 FIELDS: dict[str, Field] = {
     "position": Field("m", "(n, d)", "current position x", lambda s: s.nodes.point.numpy()["x"].copy()),
     "displacement": Field("m", "(n, d)", "u = x − X", lambda s: s.nodes.displacement.numpy().copy()),
-    "velocity": Field("m/s", "(n, d)", "velocity v", lambda s: _phi(s)[:, : s.lattice.dim].copy()),
+    "velocity": Field("m/s", "(n, d)", "velocity v", lambda s: _phi(s)[:, : s.mesh.dim].copy()),
     "stress": Field("Pa", "(n, s)", "Cauchy stress σ, stored components, tension positive", _stress),
-    "von_mises_stress": Field("Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.lattice.continuum)),
+    "von_mises_stress": Field("Pa", "(n,)", "q = √(3 J₂)", lambda s: von_mises(_stress(s), s.mesh.continuum)),
     "mean_stress": Field(
-        "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.lattice.continuum)
+        "Pa", "(n,)", "tr σ/3, tension positive", lambda s: mean_stress(_stress(s), s.mesh.continuum)
     ),
     "strain": Field(
         "-",
         "(n, s)",
         "Green-Lagrange strain, components as of the stress",
-        lambda s: green_strain(s.lattice, s.nodes.displacement.numpy()),
+        lambda s: green_strain(s.mesh, s.nodes.displacement.numpy()),
     ),
     "yield_size": Field("Pa", "(n,)", "size of the yield surface Y", _yield_size, _has_yield),
     "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
@@ -141,7 +141,7 @@ FIELDS: dict[str, Field] = {
         "kg",
         "(n,)",
         "mass of the node (per metre of thickness in plane strain, per square metre of section in a bar)",
-        lambda s: s.scene.material.density * s.lattice.node_volumes()[0],
+        lambda s: s.scene.material.density * s.mesh.node_volumes()[0],
     ),
 }
 
@@ -153,7 +153,7 @@ def fields_of(scene: Scene) -> dict[str, Field]:
 
 def internal_variables(scene: Scene) -> dict[str, Field]:
     """What the nodes of a scene remember of their material, by name."""
-    history = law(scene.material, scene.lattice.continuum, PRECISIONS["float64"]).history
+    history = law(scene.material, scene.mesh.continuum, PRECISIONS["float64"]).history
     return {
         name: Field(unit, "(n,)", meaning, lambda s, k=k: s.history.numpy()[:, k].copy())
         for k, (name, unit, meaning) in enumerate(history)

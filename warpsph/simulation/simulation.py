@@ -10,13 +10,13 @@ from typing import Protocol
 
 import numpy as np
 
+from ..device.launching import Launcher
+from ..device.precision import precision as precision_of
 from ..errors import NonFiniteError, SceneError, one_of
-from ..ground.launching import Launcher
-from ..ground.precision import precision as precision_of
-from ..operators.clock import LONGEST_RUN
 from ..scene.scene import Scene
-from ..scene.validate import instance, number, vector
+from ..state.clock import LONGEST_RUN
 from ..step.step import Stepper
+from ..validate import instance, number, vector
 from .device import choose_device, choose_threads
 from .fields import fields_of
 from .interrupts import held_back
@@ -76,9 +76,9 @@ class Simulation:
         self.scene = instance("scene", scene, Scene, "a Scene")
         self.precision = precision_of(precision)
         self.device = choose_device(device)
-        self.lattice = scene.lattice
+        self.mesh = scene.mesh
         self._initial_limit = time_step_limit(scene)
-        launcher = Launcher(self.device, choose_threads(threads, len(self.lattice.nodes)))
+        launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
         self._stepper = Stepper(scene, self.precision, launcher)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
@@ -142,7 +142,7 @@ class Simulation:
         """Where the next steps begin [s], up to the one after which an observer looks."""
         due = min((getattr(observer, "next_time", -math.inf) for observer in observers), default=math.inf)
         ahead = AHEAD_ON_CPU if self.device.is_cpu else AHEAD_ON_GPU
-        most = max(1, min(LONGEST_RUN, ahead // len(self.lattice.nodes), leg.first + leg.steps - self.steps))
+        most = max(1, min(LONGEST_RUN, ahead // len(self.mesh.nodes), leg.first + leg.steps - self.steps))
         times = [leg.time_after(self.steps + k) for k in range(most + 1)]
         return times[: next((k for k in range(1, most) if times[k] >= due), most)]
 
@@ -156,7 +156,7 @@ class Simulation:
         self.wall_time += clock.perf_counter() - begin
         if outcome.non_finite:
             node = self._first_non_finite()
-            raise NonFiniteError(self.steps, self.time, node, self.lattice.nodes[node])
+            raise NonFiniteError(self.steps, self.time, node, self.mesh.nodes[node])
 
     def _first_non_finite(self) -> int:
         values = [self.nodes.point.numpy()["phi"], self.nodes.displacement.numpy()]
@@ -198,8 +198,8 @@ class Simulation:
 
     def nearest_node(self, point: Iterable[float]) -> int:
         """Index of the material node that is initially nearest to a point [m]."""
-        target = np.array(vector("point", tuple(point), self.lattice.dim))
-        return int(np.argmin(((self.lattice.nodes - target) ** 2).sum(axis=1)))
+        target = np.array(vector("point", tuple(point), self.mesh.dim))
+        return int(np.argmin(((self.mesh.nodes - target) ** 2).sum(axis=1)))
 
     @property
     def list_builds(self) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 import warp as wp
 
 from ..scene.check import Check
-from .files import write_whole
+from ..storage.files import write_whole
 from .simulation import Simulation
 
 
@@ -35,7 +35,7 @@ def summarise(
         stopped: whether it was asked to stop on its way.
     """
     stepped = simulation.steps > 0
-    rate = len(simulation.lattice.nodes) * simulation.steps / simulation.wall_time if stepped else 0.0
+    rate = len(simulation.mesh.nodes) * simulation.steps / simulation.wall_time if stepped else 0.0
     return {
         "scene": simulation.scene.name,
         "parameters": dict(parameters),
@@ -45,8 +45,8 @@ def summarise(
         "device_name": simulation.device.name,
         "threads": simulation.threads,
         "precision": simulation.precision.name,
-        "nodes": len(simulation.lattice.nodes),
-        "auxiliary_nodes": len(simulation.lattice.cells),
+        "nodes": len(simulation.mesh.nodes),
+        "auxiliary_nodes": len(simulation.mesh.cells),
         "steps": simulation.steps,
         "time_step": {
             "min": simulation.shortest_step if stepped else None,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..device.precision import PRECISIONS
 from ..errors import SceneError
-from ..ground.precision import PRECISIONS
-from ..ground.smoothing import SMOOTHING_FUNCTIONS, second_moment
 from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
+from ..physics.smoothing import SMOOTHING_FUNCTIONS, second_moment
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 
@@ -23,7 +23,7 @@ def courant_limit(scene: Scene) -> float:
     else `EDGE_LIMIT`."""
     numerics, precision = scene.numerics, PRECISIONS["float64"]
     weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    support, dim = KERNELS[numerics.kernel].support, scene.lattice.dim
+    support, dim = KERNELS[numerics.kernel].support, scene.mesh.dim
     moment = second_moment(weight, precision, numerics.smoothing_ratio, support, dim)
     limit = 2.0 * math.sqrt(moment)
     if numerics.unloads:
@@ -40,8 +40,8 @@ def time_step_limit(scene: Scene) -> float:
     Raises:
         SceneError: the Courant number (or the given time step) is beyond the wave limit.
     """
-    numerics, material, lattice = scene.numerics, scene.material, scene.lattice
-    per_courant = lattice.smallest_edge() / material.wave_speed(lattice.dim)
+    numerics, material, mesh = scene.numerics, scene.material, scene.mesh
+    per_courant = mesh.smallest_edge() / material.wave_speed(mesh.dim)
     limit = courant_limit(scene)
     if numerics.time_step is not None:
         if numerics.time_step > limit * per_courant * (1.0 + ROUNDING):
@@ -55,7 +55,7 @@ def time_step_limit(scene: Scene) -> float:
             f"up to {limit:.4g}",
         )
     dt = numerics.courant * per_courant
-    rate = material.flow_rate(lattice.dim)
+    rate = material.flow_rate(mesh.dim)
     if rate > 0.0 and numerics.source_scheme == "rk4":
         dt = min(dt, 2.0 * MOST_SUBSTEPS * STIFFNESS_LIMIT / rate)
     return dt

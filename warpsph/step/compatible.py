@@ -16,25 +16,25 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.arrays import packed
-from ..ground.compiling import forward_kernel
-from ..ground.kinematics import kinematics
-from ..ground.launching import Launcher
-from ..ground.materials.law import Law
-from ..ground.precision import Precision
-from ..ground.unknowns import unknowns
-from ..nodes.neighbours import PairList
-from ..nodes.node_sets import node_types
-from ..operators.cells import apart_on, cell_types
-from ..operators.clock import HALF, put
+from ..device.arrays import packed
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.precision import Precision
+from ..materials.law import Law
+from ..mesh.continuum import Continuum
+from ..operators.cell_means import apart_on, cell_types
+from ..operators.checkerboard import taken_off
 from ..operators.conditions import ConditionTypes
-from ..operators.damping import taken_off
+from ..operators.front import STRENGTH, front_pressure
 from ..operators.motion import half_step_gradient, initial_gradient
-from ..operators.shock import STRENGTH, front_pressure
-from ..operators.sweep import Sweep, batch_on, sweep
-from ..operators.waves import wave_rate
-from ..scene.dimension import Continuum
+from ..operators.neighbour_sums import Sweep, batch_on, sweep
+from ..physics.stress import kinematics
+from ..physics.unknowns import unknowns
+from ..physics.waves import wave_rate
 from ..scene.scene import Scene
+from ..state.clock import HALF, put
+from ..state.nodes import node_types
+from ..state.pairs import PairList
 
 # θ of the velocity: the share of its checkerboard taken off in a step. It costs little: with 20 cells a half
 # wavelength (kΔ)⁴/16 = 4·10⁻⁵ of a wave.
@@ -53,8 +53,8 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
         2D:  ½ C² (16 C² − 16 + 8 κ) − θ,        3D:  ½ C² (36 C² − 36 + 24 κ) − 3 θ,
 
     θ the mean share of the checkerboard taken off, of the velocity's alone, since the stress's is bounded
-    (`warpsph.operators.damping`). κ is the most for which it is not positive, with a margin; all other waves are
-    damped then (tests/test_stability.py), for any Poisson's ratio.
+    (`warpsph.operators.checkerboard`). κ is the most for which it is not positive, with a margin; all other waves
+    are damped then (tests/test_stability.py), for any Poisson's ratio.
 
     The stress's gradient stays that of the middle. Were it taken towards the corner as well, nodes in equilibrium
     would have cells that are not, δv would strain the body step by step, and what has come to rest would flow.
@@ -88,15 +88,15 @@ class CompatibleFluxes:
     def __init__(
         self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
     ):
-        lattice, kernel = scene.lattice, scene.numerics.kernel
-        continuum, moves = lattice.continuum, scene.large_displacements
+        mesh, kernel = scene.mesh, scene.numerics.kernel
+        continuum, moves = mesh.continuum, scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
         device = launcher.device
         apart = apart_on(device)
         self._launcher = launcher
-        self._dim, self._reach = lattice.dim, scene.numerics.support
+        self._dim, self._reach = mesh.dim, scene.numerics.support
         self._front, self._share = (wp.zeros(1, dtype=precision.real, device=device) for _ in range(2))
-        self._cells = cell_types(continuum, precision, apart).new(lattice, device)
+        self._cells = cell_types(continuum, precision, apart).new(mesh, device)
         parts = sweep(continuum, precision, kernel, batch_on(device))
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law, apart)
         self._to_nodes = _to_nodes_kernel(

@@ -4,20 +4,20 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.compiling import forward_kernel
-from ..ground.launching import Launcher
-from ..ground.materials.law import Law
-from ..ground.precision import Precision
-from ..ground.unknowns import unknowns
-from ..nodes.neighbours import PairList
-from ..nodes.node_sets import node_types
-from ..operators.clock import HALF
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.precision import Precision
+from ..materials.law import Law
+from ..mesh.continuum import Continuum
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
-from ..operators.sweep import Sweep, batch_on, sweep
-from ..operators.waves import wave_rate
-from ..scene.dimension import Continuum
+from ..operators.neighbour_sums import Sweep, batch_on, sweep
+from ..physics.unknowns import unknowns
+from ..physics.waves import wave_rate
 from ..scene.scene import Scene
+from ..state.clock import HALF
+from ..state.nodes import node_types
+from ..state.pairs import PairList
 from .velocity_schemes import VELOCITY_SCHEMES
 
 
@@ -37,7 +37,7 @@ class PublishedFluxes:
         self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
     ):
         self._launcher = launcher
-        continuum, numerics = scene.lattice.continuum, scene.numerics
+        continuum, numerics = scene.mesh.continuum, scene.numerics
         parts = sweep(continuum, precision, numerics.kernel, batch_on(launcher.device))
         self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, law.Parameters)
         self._to_nodes = _to_nodes_kernel(

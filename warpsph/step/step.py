@@ -4,25 +4,25 @@ from collections.abc import Sequence
 
 import warp as wp
 
-from ..ground.compiling import load_kernels
-from ..ground.launching import Launcher, Recording
-from ..ground.materials import law as material_law
-from ..ground.precision import Precision
-from ..nodes.neighbours import SKIN, Neighbours
-from ..nodes.node_sets import (
+from ..device.compiling import load_kernels
+from ..device.launching import Launcher, Recording
+from ..device.precision import Precision
+from ..materials import law as material_law
+from ..operators.cell_motion import CellMotion
+from ..operators.conditions import Conditions
+from ..operators.motion import Motion, NoMotion, centre_kernel
+from ..operators.sources import sources
+from ..operators.surface.release import FreeSurfaceConditions
+from ..scene.numerics import KERNELS
+from ..scene.scene import Scene
+from ..state.clock import Clock, Outcome
+from ..state.nodes import (
     auxiliary_nodes,
     material_history,
     material_nodes,
     node_types,
 )
-from ..operators.cell_motion import CellMotion
-from ..operators.clock import Clock, Outcome
-from ..operators.conditions import Conditions
-from ..operators.free_surface import FreeSurfaceConditions
-from ..operators.motion import Motion, NoMotion, centre_kernel
-from ..operators.sources import sources
-from ..scene.numerics import KERNELS
-from ..scene.scene import Scene
+from ..state.pairs import SKIN, Neighbours
 from .fluxes import FLUXES
 
 
@@ -35,7 +35,7 @@ class Stepper:
         launcher: launches the kernels.
 
     Attributes:
-        nodes: material nodes (struct of arrays, see `warpsph.nodes.node_sets`).
+        nodes: material nodes (struct of arrays, see `warpsph.state.nodes`).
         auxiliary: auxiliary nodes.
         history: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
@@ -45,8 +45,8 @@ class Stepper:
     """
 
     def __init__(self, scene: Scene, precision: Precision, launcher: Launcher):
-        lattice, numerics, device = scene.lattice, scene.numerics, launcher.device
-        continuum, n = lattice.continuum, len(lattice.nodes)
+        mesh, numerics, device = scene.mesh, scene.numerics, launcher.device
+        continuum, n = mesh.continuum, len(mesh.nodes)
         types = node_types(continuum, precision)
         law = material_law(scene.material, continuum, precision)
         self._parameters = law.fill(scene.material)
@@ -60,10 +60,10 @@ class Stepper:
         support, skin = KERNELS[numerics.kernel].support, 0.0
         self._motion = NoMotion()
         if scene.large_displacements:
-            skin = SKIN * lattice.spacing
+            skin = SKIN * mesh.spacing
             moving = CellMotion if numerics.follows_cells else Motion
             self._motion = moving(scene, skin, precision, launcher, self.clock.lists_outdated)
-        search = (support, lattice.spacing, skin)
+        search = (support, mesh.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
         centre = centre_kernel(continuum, precision)
         load_kernels([centre], device)
@@ -72,7 +72,7 @@ class Stepper:
         self._around_nodes = Neighbours(continuum, precision, launcher, self.nodes, self.auxiliary, *search)
         self._sources = sources(scene, law, self._parameters, precision, launcher)
         if scene.free_surface is None:
-            turns = numerics.unloads and scene.large_displacements and lattice.dim > 1
+            turns = numerics.unloads and scene.large_displacements and mesh.dim > 1
             self.conditions = Conditions(scene.boundary, n, continuum, precision, launcher, self.clock, turns)
         else:
             self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, launcher, self.clock)
@@ -81,7 +81,7 @@ class Stepper:
         load_kernels([kernel for part in parts for kernel in part.kernels], device)
 
         self.list_builds, self.shrinkage = 0, 1.0
-        self._per_spacing = scene.material.wave_speed(lattice.dim) / lattice.smallest_edge()
+        self._per_spacing = scene.material.wave_speed(mesh.dim) / mesh.smallest_edge()
         self._build_lists()
         self._begin([0.0], 0.0)
         self.conditions.apply(self.nodes)

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from ..ground.precision import Precision
+from ..device.precision import Precision
 
 
 @cache

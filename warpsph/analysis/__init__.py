@@ -1,0 +1,1 @@
+"""Measures of fields: NumPy arrays in, numbers out."""

@@ -1,0 +1,1 @@
+"""Warp, and nothing of the method: precision, compiling, launching, arrays, small matrices."""

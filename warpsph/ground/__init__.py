@@ -1,1 +1,0 @@
-"""The ground floor: precision, smoothing functions, kinematics, materials. Pure functions only."""

@@ -1,0 +1,1 @@
+"""Geometry, NumPy only: nodes, cells and faces, and the kinds of cell."""

@@ -1,0 +1,52 @@
+"""Meshes of the cells of a regular grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SceneError
+from .kinds import GRID_KINDS
+from .mesh import Mesh
+
+
+def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.ndarray) -> Mesh:
+    """The mesh made of the cells of a regular grid that are kept.
+
+    Args:
+        kept: which cells belong to the body, boolean, one axis a dimension.
+        spacing: Δx [m].
+        origin: low corner of the grid [m], shape (d,).
+        size: extent of the grid along each axis [m], shape (d,); gives coordinates without round-off drift.
+    """
+    dim = kept.ndim
+    if not kept.any():
+        raise SceneError("shape", "no cell", "at least one whole cell of the lattice must lie inside the shape")
+    index = np.argwhere(kept)
+    kind = GRID_KINDS[dim]
+    offsets = np.array(kind.points, dtype=int)
+    points = np.array(kept.shape) + 1
+    corner = np.ravel_multi_index(tuple(np.moveaxis(index[:, None, :] + offsets[None], 2, 0)), tuple(points))
+    used, cells = np.unique(corner, return_inverse=True)
+    cells = cells.reshape(corner.shape)
+    coordinates = np.stack(np.unravel_index(used, tuple(points)), axis=1)
+    nodes = origin + size * (coordinates / np.array(kept.shape))
+
+    padded = np.pad(kept, 1)
+    faces, face_cell, face_side = [], [], []
+    for axis in range(dim):
+        for high in (0, 1):
+            neighbour = index + 1
+            neighbour[:, axis] += 1 if high else -1
+            bare = np.flatnonzero(~padded[tuple(neighbour.T)])
+            side = 2 * axis + high
+            faces.append(cells[bare][:, kind.faces[side]])
+            face_cell.append(bare)
+            face_side.append(np.full(len(bare), side))
+    return Mesh(
+        spacing=spacing,
+        nodes=nodes,
+        cells=cells,
+        faces=np.concatenate(faces),
+        face_cell=np.concatenate(face_cell),
+        face_side=np.concatenate(face_side),
+    )

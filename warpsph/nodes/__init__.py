@@ -1,1 +1,0 @@
-"""The two node sets and the pair lists between them."""

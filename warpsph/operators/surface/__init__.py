@@ -1,0 +1,1 @@
+"""A free surface that moves: found, and freed of its tractions."""

@@ -1,0 +1,264 @@
+"""The moving free surface: conditions that also free the body's edge, wherever it now is, of its tractions.
+
+Tractions vanish on every face that a surface node lies on: σ ← P σ P, P the projector onto the directions that
+lie in all of its faces. On a smooth surface P = 1 − n n; along the edge of a solid P = e e; at a corner, of two
+edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept. Where tractions vanish by elastic
+unloading, strains along the m directions taken out do it, and with them σ ← P σ P − λ/(m λ + 2G) tr(σ − P σ)
+(P + the direction out of plane).
+
+At the end of a wall a velocity condition beats the traction condition: only the directions that nobody moves are
+freed, so there n stands for its part along them. Without that a slope's toe would carry the full overburden on its
+free face. Where the surface goes on smoothly from the wall, as beside a footing, the wall's last node lies on one
+face only, the wall's, and nothing is freed.
+"""
+
+import math
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from ...device.compiling import forward_kernel
+from ...device.launching import Launcher
+from ...device.linear_algebra import rotation_of
+from ...device.precision import Precision
+from ...mesh.continuum import Continuum
+from ...physics.smoothing import wendland_c2
+from ...physics.stress import kinematics
+from ...physics.unknowns import unknowns
+from ...scene.resolve import SMOOTH_EDGE_ANGLE
+from ...scene.scene import Scene
+from ...state.clock import Clock
+from ...state.nodes import node_types
+from ...state.pairs import PairList
+from ..conditions import Conditions, ConditionTypes, apply_kernel, condition_types
+from .scan import SurfaceScan, surface_types
+
+# The surface is found anew once ∫|L| dt since the last time reaches this anywhere on it: the direction from one
+# node to the next, and with it a normal, turns by no more than that.
+LARGEST_TURN = math.radians(1.0)
+# A face with less than this left of its normal, as a sine, is parallel to a wall or to a face already freed.
+PARALLEL = 0.1
+# At the end of a wall the scan's normal stands halfway between those of the wall and the free surface.
+HALF_EDGE = 0.5 * SMOOTH_EDGE_ANGLE
+
+
+class FreeSurfaceConditions(Conditions):
+    """The conditions of a scene with a moving free surface.
+
+    Args:
+        scene: the scene.
+        nodes: material nodes.
+    """
+
+    def __init__(self, scene: Scene, nodes, precision: Precision, launcher: Launcher, clock: Clock):
+        device, mesh, surface = launcher.device, scene.mesh, scene.free_surface
+        continuum, types = mesh.continuum, node_types(mesh.continuum, precision)
+        super().__init__(scene.boundary, len(mesh.nodes), continuum, precision, launcher, clock)
+        self._unmoved = ~surface.moved(mesh, scene.boundary)
+        self._moves = scene.large_displacements
+        self._scan = SurfaceScan(scene, surface.candidates(mesh, scene.boundary), nodes, precision, launcher)
+        self.types = free_surface_types(continuum, precision)
+        self._b = self._scan.candidates.node.shape[0]
+        walls, self.table = self.table, self.types.Table()
+        self.table.conditions = walls
+        self.table.row = self._scan.row
+        self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
+        self.table.unloading = wp.array(_unloading(scene), dtype=precision.real, device=device)
+        self._turned = wp.zeros(self._b, dtype=precision.real, device=device)
+        self._outdated = clock.surface_outdated
+        self._kernel = apply_kernel(continuum, precision, self.types)
+        self._project = _project_kernel(continuum, precision)
+        self._turn = _turn_kernel(continuum, precision)
+        self.kernels = (self._kernel, self._project, self._turn, *self._scan.kernels)
+
+    def locate(self, nodes) -> None:
+        """Find the free surface in the present configuration."""
+        self._scan.find(nodes)
+        wp.launch(
+            self._project,
+            self._b,
+            inputs=[self._scan.pairs, self._scan.candidates, self.table],
+            device=self._turned.device,
+        )
+        self._turned.zero_()
+        self._outdated.zero_()
+
+    def turn(self, nodes, dt: wp.array) -> None:
+        """Turn the directions freed as the stresses turn in half a time step; never at small displacements.
+
+        A normal that lags by θ leaves the shear traction σ_tt θ, which drives a spinning body round.
+        """
+        if self._moves:
+            inputs = [nodes, dt, self.table, self._turned, self._outdated]
+            self._launcher.launch(self._turn, nodes.point, inputs, gathers=False)
+
+    def on_surface(self) -> np.ndarray:
+        """Which nodes are on the free surface and not under a velocity condition, boolean, shape (n,)."""
+        found = np.zeros(len(self._unmoved), dtype=bool)
+        candidates = self._scan.candidates
+        found[candidates.node.numpy()] = candidates.exposed.numpy() == 1
+        return found & self._unmoved
+
+    def normals(self) -> np.ndarray:
+        """Outward unit normals of the nodes on the free surface, zero elsewhere, shape (n, d)."""
+        candidates = self._scan.candidates
+        values = candidates.normal.numpy()
+        normals = np.zeros((len(self._unmoved), values.shape[1]), dtype=values.dtype)
+        normals[candidates.node.numpy()] = values
+        return np.where(self.on_surface()[:, None], normals, 0.0)
+
+
+@cache
+def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionTypes:
+    """The conditions' table and function, with the free surface: P of each candidate after all else."""
+    phi, walls = unknowns(continuum, precision), condition_types(continuum, precision)
+    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
+    kin, types, dim, real = (
+        kinematics(continuum, precision),
+        node_types(continuum, precision),
+        continuum.dim,
+        precision.real,
+    )
+    apply_walls, transform, spherical = walls.apply, kin.transform, kin.spherical
+    stress, tensor = types.stress, types.tensor
+
+    @wp.func
+    def in_space(sigma: stress):
+        """σ11 + … + σdd."""
+        total = real(0.0)
+        for k in range(wp.static(dim)):
+            total += sigma[k]
+        return total
+
+    @wp.struct
+    class Table:
+        conditions: walls.Table
+        row: wp.array(dtype=wp.int32)
+        projector: wp.array(dtype=precision.mat(continuum.dim, continuum.dim))
+        unloading: wp.array(dtype=precision.real)
+
+    @wp.func
+    def released(sigma: stress, P: tensor, unloading: wp.array(dtype=real)):
+        left = transform(sigma, P)
+        lost = in_space(sigma) - in_space(left)
+        taken = dim - wp.int32(wp.trace(P) + real(0.5))
+        return left - unloading[taken] * lost * transform(spherical(real(1.0)), P)
+
+    @wp.func
+    def apply(i: int, values: phi.phi, when: int, table: Table):
+        result = apply_walls(i, values, when, table.conditions)
+        c = table.row[i]
+        if c >= 0:
+            result = join(velocity_of(result), released(stress_of(result), table.projector[c], table.unloading))
+        return result
+
+    return ConditionTypes(Table, apply)
+
+
+def _unloading(scene: Scene) -> list[float]:
+    """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
+    material, dim = scene.material, scene.mesh.dim
+    if not scene.numerics.unloads:
+        return [0.0] * (dim + 1)
+    lame, shear = material.lame_modulus, material.shear_modulus
+    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, dim + 1))]
+
+
+@cache
+def _project_kernel(continuum: Continuum, precision: Precision):
+    types, surface = node_types(continuum, precision), surface_types(continuum, precision)
+    real, vector, tensor, dim = precision.real, types.vector, types.tensor, continuum.dim
+    Table, Candidates = free_surface_types(continuum, precision).Table, surface.Candidates
+    on_face, weights = surface.on_face, wendland_c2(precision)
+    identity, same_face, smooth = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE), math.cos(HALF_EDGE)
+
+    @wp.func
+    def faces_of(c: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
+        """Normals of the smooth faces that meet at c, not normalised, one a row; zero rows are left."""
+        x, h = candidates.point[c].x, candidates.smoothing_length[c]
+        faces = tensor()
+        count = wp.int32(0)
+        for k in range(pairs.start[c], pairs.start[c + 1]):
+            o = on_face(c, k, pairs, row, candidates)
+            if o >= 0 and candidates.sharp[o] == 0:
+                normal = candidates.normal[o]
+                face = count
+                for f in range(count):
+                    if wp.dot(normal, wp.normalize(faces[f])) > real(same_face):
+                        face = f
+                if face < wp.static(dim):
+                    p = (candidates.point[o].x - x) / h
+                    w, _ = weights(wp.dot(p, p))
+                    faces[face] = faces[face] + w * normal
+                    count = wp.max(count, face + 1)
+        if count == 0:
+            faces[0] = candidates.normal[c]
+        return faces
+
+    @wp.func
+    def without(projector: tensor, normal: vector):
+        """The projector onto what is left of its range without its part along a face's normal."""
+        part = projector * normal
+        if wp.length(part) > real(PARALLEL):
+            unit = wp.normalize(part)
+            return projector - wp.outer(unit, unit)
+        return projector
+
+    @wp.func
+    def freed_part(face: vector, c: int, candidates: Candidates, table: Table):
+        """The part of a face's normal along the directions in which its traction must vanish."""
+        wall = table.conditions.row[candidates.node[c]]
+        if wall < 0:
+            return face
+        if wp.dot(candidates.scan_normal[c], face) > real(smooth):
+            return vector()
+        return table.conditions.velocity_projector[wall] * face
+
+    @forward_kernel
+    def project(pairs: PairList, candidates: Candidates, table: Table):
+        c = wp.tid()
+        projector = identity
+        if candidates.exposed[c] == 1 and candidates.sharp[c] == 0:
+            projector = without(projector, freed_part(candidates.normal[c], c, candidates, table))
+        elif candidates.exposed[c] == 1:
+            faces = faces_of(c, pairs, table.row, candidates)
+            mean = vector()
+            for f in range(wp.static(dim)):
+                face = wp.normalize(faces[f])
+                mean += face
+                projector = without(projector, freed_part(face, c, candidates, table))
+            candidates.normal[c] = wp.normalize(mean)
+        table.projector[c] = projector
+
+    return project
+
+
+@cache
+def _turn_kernel(continuum: Continuum, precision: Precision):
+    MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
+    Table = free_surface_types(continuum, precision).Table
+    rotation = rotation_of(continuum.dim, precision)
+
+    @forward_kernel
+    def turn(
+        first: int,
+        nodes: MaterialNodes,
+        dt: wp.array(dtype=real),
+        table: Table,
+        turned: wp.array(dtype=real),
+        outdated: wp.array(dtype=wp.int32),
+    ):
+        i = first + wp.tid()
+        c = table.row[i]
+        if c < 0:
+            return
+        L = nodes.velocity_gradient[i]
+        half = real(0.5) * dt[0]
+        R = rotation(L, half)
+        table.projector[c] = R * table.projector[c] * wp.transpose(R)
+        turned[c] += half * wp.sqrt(wp.ddot(L, L))
+        if turned[c] > real(LARGEST_TURN):
+            outdated[0] = 1
+
+    return turn

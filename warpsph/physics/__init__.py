@@ -1,0 +1,1 @@
+"""Pure device functions: stresses, unknowns, waves, smoothing functions."""

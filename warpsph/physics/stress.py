@@ -1,0 +1,209 @@
+"""What a velocity gradient does to stresses and a stress gradient to velocities, in one, two and three dimensions.
+
+`L` is the velocity gradient L_ij = ∂v_i/∂x_j. Stresses are stored as vectors in the order of
+`Continuum.pairs`: bar (11), plane strain (11, 22, 12, 33), solid (11, 22, 33, 12, 13, 23).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import warp as wp
+
+from ..device.precision import Precision
+from ..mesh.continuum import Continuum
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """The pure functions of one continuum in one precision.
+
+    Attributes:
+        elastic_rate: (L, λ, G, E) → Dₑ : d.
+        divergence: gradient of the stored stresses (s × d) → div σ (d).
+        spin: (σ, L) → ω σ − σ ω (Jaumann).
+        von_mises: σ → q = √(3 J₂); |σ| in a bar.
+        relaxation: (σ, q, G, E) → Dₑ : ∂q/∂σ = 3 G s/q; E σ/q in a bar.
+        spherical: p → p 1 as stored, σ33 of plane strain included; p in a bar.
+        transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
+        norm: σ → √(σ : σ).
+    """
+
+    elastic_rate: wp.Function
+    divergence: wp.Function
+    spin: wp.Function
+    von_mises: wp.Function
+    relaxation: wp.Function
+    spherical: wp.Function
+    transform: wp.Function
+    norm: wp.Function
+
+
+@cache
+def kinematics(continuum: Continuum, precision: Precision) -> Kinematics:
+    """The functions of a continuum."""
+    return _KINEMATICS[continuum.name](precision)
+
+
+def _bar(precision: Precision) -> Kinematics:
+    """Uniaxial stress: one velocity, one stress, modulus E."""
+    real, stress, vector = precision.real, precision.vec(1), precision.vec(1)
+    matrix = precision.mat(1, 1)
+
+    @wp.func
+    def elastic_rate(L: matrix, lame: real, shear: real, young: real):
+        return stress(young * L[0, 0])
+
+    @wp.func
+    def divergence(g: matrix):
+        return vector(g[0, 0])
+
+    @wp.func
+    def spin(sigma: stress, L: matrix):
+        return stress(real(0.0))
+
+    @wp.func
+    def von_mises(sigma: stress):
+        return wp.abs(sigma[0])
+
+    @wp.func
+    def relaxation(sigma: stress, q: real, shear: real, young: real):
+        return (young / q) * sigma
+
+    @wp.func
+    def spherical(p: real):
+        return stress(p)
+
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        return P[0, 0] * sigma * P[0, 0]
+
+    @wp.func
+    def norm(sigma: stress):
+        return wp.abs(sigma[0])
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+
+
+def _plane_strain(precision: Precision) -> Kinematics:
+    """Two velocities; stresses 11, 22, 12, 33 with d33 = 0."""
+    real, stress, vector = precision.real, precision.vec(4), precision.vec(2)
+    matrix, gradient = precision.mat(2, 2), precision.mat(4, 2)
+
+    @wp.func
+    def elastic_rate(L: matrix, lame: real, shear: real, young: real):
+        volumetric = lame * (L[0, 0] + L[1, 1])
+        two_g = real(2.0) * shear
+        return stress(
+            volumetric + two_g * L[0, 0],
+            volumetric + two_g * L[1, 1],
+            shear * (L[0, 1] + L[1, 0]),
+            volumetric,
+        )
+
+    @wp.func
+    def divergence(g: gradient):
+        return vector(g[0, 0] + g[2, 1], g[2, 0] + g[1, 1])
+
+    @wp.func
+    def spin(sigma: stress, L: matrix):
+        w = real(0.5) * (L[0, 1] - L[1, 0])
+        turn = real(2.0) * w * sigma[2]
+        return stress(turn, -turn, w * (sigma[1] - sigma[0]), real(0.0))
+
+    @wp.func
+    def von_mises(sigma: stress):
+        a = sigma[0] - sigma[1]
+        b = sigma[1] - sigma[3]
+        c = sigma[3] - sigma[0]
+        return wp.sqrt(real(0.5) * (a * a + b * b + c * c) + real(3.0) * sigma[2] * sigma[2])
+
+    @wp.func
+    def relaxation(sigma: stress, q: real, shear: real, young: real):
+        mean = (sigma[0] + sigma[1] + sigma[3]) / real(3.0)
+        deviator = stress(sigma[0] - mean, sigma[1] - mean, sigma[2], sigma[3] - mean)
+        return (real(3.0) * shear / q) * deviator
+
+    @wp.func
+    def spherical(p: real):
+        return stress(p, p, real(0.0), p)
+
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        s = P * matrix(sigma[0], sigma[2], sigma[2], sigma[1]) * wp.transpose(P)
+        return stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
+
+    @wp.func
+    def norm(sigma: stress):
+        return wp.sqrt(wp.dot(sigma, sigma) + sigma[2] * sigma[2])
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+
+
+def _solid(precision: Precision) -> Kinematics:
+    """Three velocities; stresses 11, 22, 33, 12, 13, 23."""
+    real, stress, vector = precision.real, precision.vec(6), precision.vec(3)
+    matrix, gradient = precision.mat(3, 3), precision.mat(6, 3)
+
+    @wp.func
+    def tensor(s: stress):
+        return matrix(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2])
+
+    @wp.func
+    def stored(m: matrix):
+        return stress(m[0, 0], m[1, 1], m[2, 2], m[0, 1], m[0, 2], m[1, 2])
+
+    @wp.func
+    def elastic_rate(L: matrix, lame: real, shear: real, young: real):
+        volumetric = lame * wp.trace(L)
+        return stored(volumetric * wp.identity(n=3, dtype=real) + shear * (L + wp.transpose(L)))
+
+    @wp.func
+    def divergence(g: gradient):
+        return vector(
+            g[0, 0] + g[3, 1] + g[4, 2],
+            g[3, 0] + g[1, 1] + g[5, 2],
+            g[4, 0] + g[5, 1] + g[2, 2],
+        )
+
+    @wp.func
+    def spin(sigma: stress, L: matrix):
+        omega = real(0.5) * (L - wp.transpose(L))
+        s = tensor(sigma)
+        return stored(omega * s - s * omega)
+
+    @wp.func
+    def von_mises(sigma: stress):
+        a = sigma[0] - sigma[1]
+        b = sigma[1] - sigma[2]
+        c = sigma[2] - sigma[0]
+        shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
+        return wp.sqrt(real(0.5) * (a * a + b * b + c * c) + real(3.0) * shear2)
+
+    @wp.func
+    def relaxation(sigma: stress, q: real, shear: real, young: real):
+        mean = (sigma[0] + sigma[1] + sigma[2]) / real(3.0)
+        deviator = stress(sigma[0] - mean, sigma[1] - mean, sigma[2] - mean, sigma[3], sigma[4], sigma[5])
+        return (real(3.0) * shear / q) * deviator
+
+    @wp.func
+    def spherical(p: real):
+        return stress(p, p, p, real(0.0), real(0.0), real(0.0))
+
+    @wp.func
+    def transform(sigma: stress, P: matrix):
+        return stored(P * tensor(sigma) * wp.transpose(P))
+
+    @wp.func
+    def norm(sigma: stress):
+        shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
+        return wp.sqrt(wp.dot(sigma, sigma) + shear2)
+
+    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+
+
+_KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {
+    "bar": _bar,
+    "plane_strain": _plane_strain,
+    "solid": _solid,
+}

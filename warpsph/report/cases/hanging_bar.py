@@ -1,0 +1,60 @@
+"""The hanging bar: the paper's figure 6, complete and published velocity step side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..case import Case, Picture, Row, Section
+from ..drawing import Curve, Panel, diagram, fields
+from ..prose import prose
+from ..runs import Run
+
+COMPLETE = Run("hanging_bar_complete", "hanging_bar", ("velocity_scheme=taylor",), (0.2,))
+PUBLISHED = Run("hanging_bar_published", "hanging_bar", (), (0.2,))
+MAGNIFIED = 200.0  # displacements in the figure, as in the paper
+
+
+def case(quick: bool) -> Case:
+    """Both schemes; the same in the quick form."""
+    return Case("hanging_bar", (COMPLETE, PUBLISHED), tell)
+
+
+def tell(results, picture) -> Section:
+    """Figure 6, the checkerboard in time, and the amplitude left."""
+    both = [(label, results[run.name]) for label, run in (("complete", COMPLETE), ("published", PUBLISHED))]
+    figure6 = fields(
+        picture("6"),
+        [[_panel(f"{label} scheme", result) for label, result in both]],
+        "vertical velocity [m/s]",
+        (5.2, 7.0),
+    )
+    time = [
+        Curve(f"{label} scheme", 1e3 * result.history["time"][1:], result.history["checkerboard"][1:])
+        for label, result in both
+    ]
+    decay = diagram(
+        picture("checkerboard"), time, "time [ms]", "checkerboard of v_y [m/s]", yscale="log", ylim=(1e-8, 0.1)
+    )
+    complete, published = (result for _, result in both)
+    left = [float(result.history["checkerboard"][-1]) for _, result in both]
+    rest = complete.file.module.static_tip(published.parameters)
+    return Section(
+        prose=prose("hanging_bar"),
+        rows=[
+            Row("checkerboard of v_y, complete scheme", left[0], "m/s", "visible", 0.0, complete.seconds),
+            Row("checkerboard of v_y, published step", left[1], "m/s", "none visible", 0.0, published.seconds),
+            Row("ratio of the two", left[0] / left[1], "-"),
+            Row("deepest tip, complete scheme", float(complete.history["tip"].min()), "m", None, 2.0 * rest),
+            Row("deepest tip, published step", float(published.history["tip"].min()), "m", None, 2.0 * rest),
+        ],
+        pictures=[
+            Picture(figure6, "Fig. 6: vertical velocity on the deformed mesh at 0.2 s (displacements × 200)."),
+            Picture(decay, "Amplitude of the checkerboard in time."),
+        ],
+        results=[complete, published],
+    )
+
+
+def _panel(title, result) -> Panel:
+    position = result.mesh.nodes + MAGNIFIED * result.at("displacement")
+    return Panel(title, position, np.ascontiguousarray(result.at("velocity")[:, 1]), result.mesh)

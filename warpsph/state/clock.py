@@ -1,0 +1,138 @@
+"""What differs from step to step, on the device, so that many steps need no word from the host.
+
+Functions of time are evaluated ahead, a row a step; after each step `tick` puts the next row in place. It ends the
+run of steps when all are made, or when a flag says that the host is needed: to build lists, to find the free
+surface, or because a value is not finite.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import warp as wp
+
+from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
+from ..device.precision import Precision
+from ..mesh.continuum import Continuum
+
+LONGEST_RUN = 256  # steps
+HALF, END = 0, 1  # rows of `Clock.drive`
+STAGES = 5  # t, t + Δt/4, …, t + Δt: the classical scheme needs both ends and the middle of each half step
+
+
+class Outcome(NamedTuple):
+    """Number of steps made, and why the host is needed now."""
+
+    made: int
+    lists_outdated: bool
+    surface_outdated: bool
+    non_finite: bool
+
+
+class Clock:
+    """Loads and drives of the step that is next, and flags.
+
+    Args:
+        body_force: f(t) → b [m/s²], or None.
+        functions: the prescribed motions' functions of time, or constants.
+
+    Attributes:
+        time_step: Δt [s].
+        first_half, second_half: b at the start, the middle and the end of each half step.
+        drive: values of the functions, those at t + Δt/2 in row `HALF`, those at t + Δt in row `END`.
+        lists_outdated, surface_outdated, non_finite: one integer each, set by kernels.
+        going: 1 while steps are to be made.
+        kernels: the kernel of `tick`.
+    """
+
+    def __init__(
+        self,
+        body_force: Callable[[float], np.ndarray] | None,
+        functions: Sequence,
+        continuum: Continuum,
+        precision: Precision,
+        launcher: Launcher,
+    ):
+        vector, real, device = precision.vec(continuum.dim), precision.real, launcher.device
+        self._launcher, self._body_force, self._functions = launcher, body_force, functions
+        columns = max(1, len(functions))
+        self._forces = wp.zeros((LONGEST_RUN, STAGES), dtype=vector, device=device)
+        self._drives = wp.zeros((LONGEST_RUN, 2 * columns), dtype=real, device=device)
+        self._force = wp.zeros(STAGES, dtype=vector, device=device)
+        self._drive = wp.zeros(2 * columns, dtype=real, device=device)
+        self.drive = self._drive.reshape((2, columns))
+        self.time_step = wp.zeros(1, dtype=real, device=device)
+        self._status = wp.zeros(5, dtype=wp.int32, device=device)  # steps made, steps to make, three flags
+        self.going = wp.zeros(1, dtype=wp.int32, device=device)
+        self.first_half, self.second_half = self._force[:3], self._force[2:]
+        self.lists_outdated, self.surface_outdated, self.non_finite = (self._status[k : k + 1] for k in (2, 3, 4))
+        self._tick = _tick_kernel(continuum, precision)
+        self.kernels = (self._tick,)
+
+    def begin(self, times: Sequence[float], dt: float) -> None:
+        """Get ready for the steps from each of the times [s], at most `LONGEST_RUN`, to Δt later."""
+        half = 0.5 * dt
+        put(self.time_step, (dt,))
+        if self._body_force is not None:
+            stages = [(t, t + 0.5 * half, t + half, t + half + 0.5 * half, t + half + half) for t in times]
+            forces = np.array([[self._body_force(t) for t in row] for row in stages], dtype=float)
+            put(self._forces[: len(times)], forces)
+            put(self._force, forces[0])
+        if self._functions:
+            ends = [(t + half, t + dt) for t in times]
+            drives = np.array([[_value(f, t) for t in row for f in self._functions] for row in ends])
+            put(self._drives[: len(times)], drives)
+            put(self._drive, drives[0])
+        put(self._status[:2], (0, len(times)))
+        put(self.going, (1,))
+
+    def tick(self) -> None:
+        """Close a step: go on to the next, or end."""
+        inputs = [self._forces, self._drives, self._force, self._drive, self._status, self.going]
+        self._launcher.launch(self._tick, self.going, inputs)
+
+    def outcome(self) -> Outcome:
+        """What the steps since `begin` came to."""
+        made, _, *flags = self._status.numpy().tolist()
+        return Outcome(made, *map(bool, flags))
+
+
+def _value(function, t: float) -> float:
+    return function(t) if callable(function) else function
+
+
+def put(array: wp.array, values) -> None:
+    """Write values into an array; on the CPU without the cost of a transfer."""
+    if array.device.is_cpu:
+        array.numpy()[...] = values
+    else:
+        array.assign(np.array(values))
+
+
+@cache
+def _tick_kernel(continuum: Continuum, precision: Precision):
+    vector, real = precision.vec(continuum.dim), precision.real
+
+    @forward_kernel
+    def tick(
+        first: int,
+        forces: wp.array2d(dtype=vector),
+        drives: wp.array2d(dtype=real),
+        force: wp.array(dtype=vector),
+        drive: wp.array(dtype=real),
+        status: wp.array(dtype=wp.int32),
+        going: wp.array(dtype=wp.int32),
+    ):
+        made = status[0] + 1
+        status[0] = made
+        if made >= status[1] or status[2] + status[3] + status[4] > 0:
+            going[0] = 0
+            return
+        for k in range(force.shape[0]):
+            force[k] = forces[made, k]
+        for k in range(drive.shape[0]):
+            drive[k] = drives[made, k]
+
+    return tick

@@ -1,0 +1,1 @@
+"""Files that stand under their name whole or not at all."""
