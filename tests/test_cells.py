@@ -13,8 +13,8 @@ from warpsph.device.precision import PRECISIONS
 from warpsph.operators.cell_means import cell_types
 from warpsph.operators.front import ROUGH, front_pressure
 from warpsph.operators.neighbour_sums import sweep
+from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
-from warpsph.state.nodes import node_types
 
 DIMENSIONS = [1, 2, 3]
 ROUNDING = {"float64": 1e-13, "float32": 1e-4}
@@ -58,8 +58,9 @@ class Seen:
 @cache
 def probes(dim, precision):
     """Kernels that run `describe` on all cells and `gather` on all nodes."""
-    continuum, real = CONTINUA[dim], PRECISIONS[precision]
-    types, cell_of = node_types(continuum, real), cell_types(continuum, real)
+    real = PRECISIONS[precision]
+    space = Space(CONTINUA[dim], real)
+    types, cell_of = space.types, cell_types(space)
     describe, write, gather, Cells = cell_of.describe, cell_of.write, cell_of.gather, cell_of.Cells
     phi, phi_gradient, Point, AuxiliaryNodes = types.phi, types.phi_gradient, types.Point, types.AuxiliaryNodes
 
@@ -249,9 +250,10 @@ def test_the_frame_of_a_node_is_the_mean_of_its_cells(precision, dim):
 @pytest.mark.parametrize("dim", DIMENSIONS)
 def test_kernels_follow_the_frame_and_are_round_without_one(precision, dim):
     """M = ∇ξ/(h/Δx), which a node at ξ from the middle sees at |ξ|/(h/Δx); 1/h for the zero frame."""
-    continuum, real = CONTINUA[dim], PRECISIONS[precision]
-    tensor = node_types(continuum, real).tensor
-    metric_of = sweep(continuum, real, "gaussian").cell_metric(0.6)
+    real = PRECISIONS[precision]
+    space = Space(CONTINUA[dim], real)
+    tensor = space.types.tensor
+    metric_of = sweep(space, "gaussian").cell_metric(0.6)
 
     @wp.kernel(module="unique", enable_backward=False)
     def probe(frames: wp.array(dtype=tensor), h: real.real, metrics: wp.array(dtype=tensor)):
@@ -275,9 +277,10 @@ def test_kernels_follow_the_frame_and_are_round_without_one(precision, dim):
 @cache
 def pressure_probe(dim, precision):
     """A kernel that writes q of all cells."""
-    continuum, real = CONTINUA[dim], PRECISIONS[precision]
-    types, front = node_types(continuum, real), front_pressure(continuum, real)
-    describe, scalar = cell_types(continuum, real).describe, real.real
+    real = PRECISIONS[precision]
+    space = Space(CONTINUA[dim], real)
+    types, front = space.types, front_pressure(space)
+    describe, scalar = cell_types(space).describe, real.real
     AuxiliaryNodes, MaterialNodes = types.AuxiliaryNodes, types.MaterialNodes
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import warp as wp
-from warpsph.device import launching
 
 from warpsph import (
     BodyForce,
@@ -23,6 +22,7 @@ from warpsph import (
     Simulation,
     edge,
 )
+from warpsph.device import launching
 from warpsph.device.launching import Launcher
 from warpsph.simulation import simulation as simulation_module
 from warpsph.simulation.device import all_cores, choose_threads, start_warp

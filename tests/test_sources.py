@@ -7,7 +7,7 @@ import warp as wp
 from warpsph import BodyForce, Box, Elastic, Fixed, Numerics, PerzynaVonMises, Scene, Simulation, everywhere
 from warpsph.device.linear_algebra import rotation_of
 from warpsph.device.precision import PRECISIONS
-from warpsph.physics.stress import kinematics
+from warpsph.physics.stress import stress_functions
 from warpsph.scene import BAR, PLANE_STRAIN, SOLID
 
 STRESS = {1: (3e5,), 2: (3e5, -1e5, 5e4, 2e4), 3: (3e5, -1e5, 2e4, 5e4, -4e4, 6e4)}
@@ -226,7 +226,7 @@ def test_damping_and_a_ramped_body_force_follow_their_ode():
 def evaluate(continuum, precision, L, sigma, gradient, q, moduli):
     """All functions of a continuum's kinematics at one point, from a kernel; outputs poisoned."""
     real, d, s = PRECISIONS[precision], continuum.dim, continuum.stress_size
-    kin = kinematics(continuum, real)
+    kin = stress_functions(continuum, real)
     elastic_rate, divergence, spin = kin.elastic_rate, kin.divergence, kin.spin
     von_mises, relaxation = kin.von_mises, kin.relaxation
     stress, vector, scalar = real.vec(s), real.vec(d), real.real

@@ -11,10 +11,10 @@ from warpsph.materials import LAWS
 from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, sweep
 from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
 from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
+from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
 from warpsph.scene.material import Elastic as ElasticMaterial
 from warpsph.scene.material import PerzynaVonMises
-from warpsph.state.nodes import node_types
 from warpsph.state.pairs import PairList
 from warpsph.step.fluxes import FLUXES
 from warpsph.step.published import PublishedFluxes
@@ -76,8 +76,9 @@ def test_pair_lists_hold_every_neighbour_once(device, precision, shape):
 
 def probe_kernel(dim, precision, kernel, batch):
     """A kernel that writes the value and the gradient of one sweep."""
-    continuum, real = CONTINUA[dim], PRECISIONS[precision]
-    types, parts = node_types(continuum, real), sweep(continuum, real, kernel, batch)
+    real = PRECISIONS[precision]
+    space = Space(CONTINUA[dim], real)
+    types, parts = space.types, sweep(space, kernel, batch)
     collect, value, gradient, round_metric = parts.collect, parts.value, parts.gradient, parts.round_metric
     Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
 

@@ -1,5 +1,6 @@
 """Small matrices: the inverse of the corrected gradient's, safe when neighbours are missing; determinants."""
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,30 @@ from .precision import Precision
 # line (or plane) only. Warp's inverse would return zeros in silence.
 RANK_TOLERANCE = 1e-5
 REGULARISATION = 1e-3
+
+
+@dataclass(frozen=True)
+class LinearAlgebra:
+    """Functions of d × d matrices, d = 1 included.
+
+    Attributes:
+        determinant: A → det A.
+        inverse: A → A⁻¹ of a regular matrix.
+        symmetric_inverse: A → A⁻¹ of a symmetric positive semi-definite one, regularised where it has lost rank.
+        rotation: (L, Δt) → exp(ω Δt), ω the skew part of L.
+    """
+
+    determinant: wp.Function
+    inverse: wp.Function
+    symmetric_inverse: wp.Function
+    rotation: wp.Function
+
+
+@cache
+def linear_algebra(dim: int, precision: Precision) -> LinearAlgebra:
+    """The functions of one dimension in one precision."""
+    functions = (determinant_of, inverse_of, symmetric_inverse, rotation_of)
+    return LinearAlgebra(*(function(dim, precision) for function in functions))
 
 
 @cache

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ..device.precision import Precision
 from ..errors import SceneError, one_of
-from ..mesh.continuum import Continuum
+from ..physics.space import Space
 from ..scene.material import Elastic, PerzynaVonMises
 from .elastic import elastic
 from .law import Law
@@ -13,7 +12,7 @@ from .perzyna_von_mises import perzyna_von_mises
 LAWS = {Elastic: elastic, PerzynaVonMises: perzyna_von_mises}
 
 
-def law(material: Elastic, continuum: Continuum, precision: Precision) -> Law:
+def law(material: Elastic, space: Space) -> Law:
     """The law of a scene's material.
 
     Raises:
@@ -21,4 +20,4 @@ def law(material: Elastic, continuum: Continuum, precision: Precision) -> Law:
     """
     if type(material) not in LAWS:
         raise SceneError("material", material, one_of([kind.__name__ for kind in LAWS]))
-    return LAWS[type(material)](continuum, precision)
+    return LAWS[type(material)](space)

@@ -4,21 +4,20 @@ from functools import cache
 
 import warp as wp
 
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
+from ..physics.space import Space
 from ..scene.material import Elastic
 from .law import Law
 
 
 @cache
-def elastic(continuum: Continuum, precision: Precision) -> Law:
+def elastic(space: Space) -> Law:
     """The elastic law."""
 
     @wp.struct
     class ElasticParameters:
-        young: precision.real
-        lame: precision.real
-        shear: precision.real
+        young: space.real
+        lame: space.real
+        shear: space.real
 
     def fill(material: Elastic):
         parameters = ElasticParameters()

@@ -8,9 +8,7 @@ from functools import cache
 
 import warp as wp
 
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
-from ..physics.stress import kinematics
+from ..physics.space import Space
 from ..scene.material import PerzynaVonMises
 from .elastic import fill_moduli
 from .law import Law
@@ -19,13 +17,13 @@ MEAN_YIELD_ITERATIONS = 4
 
 
 @cache
-def perzyna_von_mises(continuum: Continuum, precision: Precision) -> Law:
+def perzyna_von_mises(space: Space) -> Law:
     """The viscoplastic law."""
-    real = precision.real
-    stress, scalar = precision.vec(continuum.stress_size), precision.vec(1)
-    kin = kinematics(continuum, precision)
+    real = space.real
+    stress, scalar = space.vec(space.continuum.stress_size), space.vec(1)
+    kin = space.stress
     von_mises, relaxation = kin.von_mises, kin.relaxation
-    in_bar = continuum.dim == 1
+    in_bar = space.dim == 1
 
     @wp.struct
     class PerzynaParameters:

@@ -25,11 +25,8 @@ import numpy as np
 import warp as wp
 
 from ..device.arrays import natural, packed
-from ..device.linear_algebra import determinant_of, inverse_of
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
 from ..mesh.mesh import Mesh
-from ..state.nodes import node_types
+from ..physics.space import Space
 
 # A cell with less than this share of the volume of a box with edges as long has folded: it has no frame, and its
 # modes are taken as they are.
@@ -64,16 +61,16 @@ def _ends(dim: int) -> np.ndarray:
     return np.array(list(itertools.product((-1.0, 1.0), repeat=dim)))
 
 
-def corner_sides(continuum: Continuum, precision: Precision):
+def corner_sides(space: Space):
     """2ξ of each corner, as a Warp matrix."""
-    return precision.mat(2**continuum.dim, continuum.dim)(*_ends(continuum.dim).ravel().tolist())
+    return space.mat(2**space.dim, space.dim)(*_ends(space.dim).ravel().tolist())
 
 
 @cache
-def edges_function(continuum: Continuum, precision: Precision) -> wp.Function:
+def edges_function(space: Space) -> wp.Function:
     """(cell, auxiliary nodes, nodes) → its edges ∂x/∂ξ_a, in column a."""
-    types, corners = node_types(continuum, precision), 2**continuum.dim
-    side = corner_sides(continuum, precision)
+    types, corners = space.types, 2**space.dim
+    side = corner_sides(space)
 
     @wp.func
     def edges_of(a: int, auxiliary: types.AuxiliaryNodes, nodes: wp.array(dtype=types.Point)):
@@ -81,19 +78,19 @@ def edges_function(continuum: Continuum, precision: Precision) -> wp.Function:
         for k in range(wp.static(corners)):
             i = auxiliary.cell[a, k]
             edges += wp.outer(nodes[i].x, side[k])
-        return precision.real(wp.static(2.0 / corners)) * edges
+        return space.real(wp.static(2.0 / corners)) * edges
 
     return edges_of
 
 
 @cache
-def frame_function(continuum: Continuum, precision: Precision) -> wp.Function:
+def frame_function(space: Space) -> wp.Function:
     """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
-    dim, real = continuum.dim, precision.real
+    dim, real = space.dim, space.real
     tensor, determinant, inverse = (
-        precision.mat(dim, dim),
-        determinant_of(dim, precision),
-        inverse_of(dim, precision),
+        space.mat(dim, dim),
+        space.algebra.determinant,
+        space.algebra.inverse,
     )
 
     @wp.func
@@ -115,15 +112,15 @@ def apart_on(device: wp.Device) -> bool:
 
 
 @cache
-def cell_types(continuum: Continuum, precision: Precision, apart: bool = False) -> CellTypes:
+def cell_types(space: Space, apart: bool = False) -> CellTypes:
     """The types and functions of one continuum in one precision.
 
     Args:
         apart: whether the same number of consecutive cells stands side by side in memory, for a GPU whose threads
             read it together, or all the numbers of a cell, for the vector registers of a CPU.
     """
-    types, dim = node_types(continuum, precision), continuum.dim
-    real, phi, tensor, phi_gradient = precision.real, types.phi, types.tensor, types.phi_gradient
+    types, dim = space.types, space.dim
+    real, phi, tensor, phi_gradient = space.real, types.phi, types.tensor, types.phi_gradient
     AuxiliaryNodes, Point = types.AuxiliaryNodes, types.Point
     corners = 2**dim
     end = _ends(dim)
@@ -131,11 +128,11 @@ def cell_types(continuum: Continuum, precision: Precision, apart: bool = False) 
     number = len(subsets)
     columns = max(1, number)  # a bar has no such mode, and Warp no matrix without columns
     alternating = np.stack([end[:, s].prod(axis=1) for s in subsets] or [np.zeros(corners)], axis=1)
-    slopes_of_modes = precision.mat(columns, dim)
-    phi_modes, position_modes = precision.mat(types.size, columns), precision.mat(dim, columns)
-    side = corner_sides(continuum, precision)
-    sign = precision.mat(corners, columns)(*alternating.ravel().tolist())
-    frame_of = frame_function(continuum, precision)
+    slopes_of_modes = space.mat(columns, dim)
+    phi_modes, position_modes = space.mat(types.size, columns), space.mat(dim, columns)
+    side = corner_sides(space)
+    sign = space.mat(corners, columns)(*alternating.ravel().tolist())
+    frame_of = frame_function(space)
 
     @wp.struct
     class Cell:

@@ -12,10 +12,8 @@ import warp as wp
 from ..device.arrays import packed
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.linear_algebra import determinant_of
-from ..device.precision import Precision
+from ..physics.space import Space
 from ..scene.scene import Scene
-from ..state.nodes import node_types
 from .cell_means import cells_of_nodes, edges_function
 from .motion import Motion
 from .spacing import Spacing
@@ -28,18 +26,18 @@ class CellMotion(Motion):
     """Moves the nodes with v^{n+1/2}; volumes, densities and smoothing lengths follow from the cells.
 
     Args:
-        scene, skin, precision, launcher, outdated: as for `Motion`.
+        scene, skin, space, launcher, outdated: as for `Motion`.
     """
 
-    def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
-        super().__init__(scene, skin, precision, launcher, outdated)
-        device, mesh, continuum = launcher.device, scene.mesh, scene.mesh.continuum
+    def __init__(self, scene: Scene, skin: float, space: Space, launcher: Launcher, outdated: wp.array):
+        super().__init__(scene, skin, space, launcher, outdated)
+        device, mesh = launcher.device, scene.mesh
         self._of_node = wp.array(cells_of_nodes(mesh), dtype=wp.int32, device=device)
-        self._initial_volume = wp.array(mesh.cell_volumes(), dtype=precision.real, device=device)
+        self._initial_volume = wp.array(mesh.cell_volumes(), dtype=space.real, device=device)
         self._ratio = scene.numerics.smoothing_ratio
-        self._cell_h = wp.zeros(len(mesh.cells), dtype=precision.real, device=device)
-        self._shift, self._measure, self._share = _kernels(continuum, precision)
-        self._spacing = Spacing(len(mesh.cells), continuum, precision, launcher)
+        self._cell_h = wp.zeros(len(mesh.cells), dtype=space.real, device=device)
+        self._shift, self._measure, self._share = _kernels(space)
+        self._spacing = Spacing(len(mesh.cells), space, launcher)
         self.kernels = (self._shift, self._measure, self._share, *self._spacing.kernels)
 
     def mark(self, nodes, auxiliary) -> None:
@@ -63,12 +61,12 @@ class CellMotion(Motion):
 
 
 @cache
-def _kernels(continuum, precision):
-    types, dim = node_types(continuum, precision), continuum.dim
-    real, vector, tensor = precision.real, types.vector, types.tensor
+def _kernels(space):
+    types, dim = space.types, space.dim
+    real, vector, tensor = space.real, types.vector, types.tensor
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
-    determinant, corners = determinant_of(dim, precision), 2**dim
-    edges_of = edges_function(continuum, precision)
+    determinant, corners = space.algebra.determinant, 2**dim
+    edges_of = edges_function(space)
 
     packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
     packed_tables = packed(wp.array2d(dtype=wp.int32))

@@ -11,20 +11,17 @@ from functools import cache
 
 import warp as wp
 
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
-from ..physics.stress import kinematics
-from ..state.nodes import node_types
+from ..physics.space import Space
 
 STRESS_SHARE = 0.1  # θ of the stress. More strengthens a shear band one cell wide
 MOST_OF_STRAIN = 0.5  # β. With 0.1 plastic zones of slow loadings turn rough, with 0.9 bodies at rest flow
 
 
 @cache
-def taken_off(continuum: Continuum, precision: Precision) -> wp.Function:
+def taken_off(space: Space) -> wp.Function:
     """(checkerboard of the stress, L, G, Δt) → what is taken off [Pa], along the checkerboard."""
-    types, real = node_types(continuum, precision), precision.real
-    norm = kinematics(continuum, precision).norm
+    types, real = space.types, space.real
+    norm = space.stress.norm
 
     @wp.func
     def off(checkerboard: types.stress, L: types.tensor, shear: real, dt: real):

@@ -11,14 +11,10 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.linear_algebra import rotation_of
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
-from ..physics.stress import kinematics
-from ..physics.unknowns import unknowns
+from ..physics.space import Space
+from ..physics.types import NodeTypes
 from ..scene.resolve import BoundaryTable
 from ..state.clock import END, Clock
-from ..state.nodes import NodeTypes, node_types
 
 
 @dataclass(frozen=True)
@@ -36,12 +32,12 @@ class ConditionTypes:
 
 
 @cache
-def condition_types(continuum: Continuum, precision: Precision) -> ConditionTypes:
+def condition_types(space: Space) -> ConditionTypes:
     """The table and the function of one continuum in one precision."""
-    types, phi = node_types(continuum, precision), unknowns(continuum, precision)
+    types, phi = space.types, space.phi
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    vector, real, transform = types.vector, precision.real, kinematics(continuum, precision).transform
-    stress_matrix = precision.mat(continuum.stress_size, continuum.stress_size)
+    vector, real, transform = types.vector, space.real, space.stress.transform
+    stress_matrix = space.mat(space.continuum.stress_size, space.continuum.stress_size)
 
     @wp.struct
     class Table:
@@ -87,36 +83,35 @@ class Conditions:
         self,
         boundary: BoundaryTable,
         n: int,
-        continuum: Continuum,
-        precision: Precision,
+        space: Space,
         launcher: Launcher,
         clock: Clock,
         turns: bool = False,
     ):
-        types, device = node_types(continuum, precision), launcher.device
+        types, device = space.types, launcher.device
         self._launcher, self._clock = launcher, clock
-        self.types = condition_types(continuum, precision)
+        self.types = condition_types(space)
         self.table = self.types.Table()
-        self._kernel = apply_kernel(continuum, precision, self.types)
+        self._kernel = apply_kernel(space, self.types)
         free = ~boundary.moved if turns else np.zeros(len(boundary.nodes), dtype=bool)
         self._any_turns = bool(free.any())
         self._turns = wp.array(free.astype(np.int32), dtype=wp.int32, device=device)
-        self._turn = turn_kernel(continuum, precision, self.types)
+        self._turn = turn_kernel(space, self.types)
         self.kernels = (self._kernel, self._turn)
         row = np.full(n, -1, dtype=np.int32)
         row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
-        self._fill(row, boundary, types, continuum, precision, device)
+        self._fill(row, boundary, types, space, device)
 
-    def _fill(self, row, boundary, types: NodeTypes, continuum, precision, device) -> None:
+    def _fill(self, row, boundary, types: NodeTypes, space, device) -> None:
         def array(values, dtype, **options):
             return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, **options)
 
-        size, table = continuum.stress_size, self.table
+        size, table = space.continuum.stress_size, self.table
         table.row = array(row, wp.int32)
         table.velocity_projector = array(boundary.velocity_projector, types.tensor)
-        table.stress_projector = array(boundary.stress_projector, precision.mat(size, size))
+        table.stress_projector = array(boundary.stress_projector, space.mat(size, size))
         rows, terms = boundary.function.shape
-        table.turned = array(np.tile(np.eye(continuum.dim), (rows, 1, 1)), types.tensor)
+        table.turned = array(np.tile(np.eye(space.dim), (rows, 1, 1)), types.tensor)
         table.amplitude = wp.zeros((rows, terms), dtype=types.vector, device=device)
         table.function = wp.zeros((rows, terms), dtype=wp.int32, device=device)
         if terms:
@@ -139,9 +134,9 @@ class Conditions:
 
 
 @cache
-def apply_kernel(continuum: Continuum, precision: Precision, conditions: ConditionTypes):
+def apply_kernel(space: Space, conditions: ConditionTypes):
     """The kernel of step 13."""
-    MaterialNodes = node_types(continuum, precision).MaterialNodes
+    MaterialNodes = space.types.MaterialNodes
     Table, apply = conditions.Table, conditions.apply
 
     @forward_kernel
@@ -158,10 +153,10 @@ def apply_kernel(continuum: Continuum, precision: Precision, conditions: Conditi
 
 
 @cache
-def turn_kernel(continuum: Continuum, precision: Precision, conditions: ConditionTypes):
+def turn_kernel(space: Space, conditions: ConditionTypes):
     """The kernel that turns the directions of some rows with the spin of their nodes."""
-    MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
-    Table, rotation = conditions.Table, rotation_of(continuum.dim, precision)
+    MaterialNodes, real = space.types.MaterialNodes, space.real
+    Table, rotation = conditions.Table, space.algebra.rotation
 
     @forward_kernel
     def turn(

@@ -11,19 +11,17 @@ from functools import cache
 
 import warp as wp
 
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
-from ..state.nodes import node_types
+from ..physics.space import Space
 
 STRENGTH = 1.0  # χ: ringing behind a front 4 % of the jump at C = 0.5 and 200 columns, 9 % without
 ROUGH = 0.3
 
 
 @cache
-def front_pressure(continuum: Continuum, precision: Precision) -> wp.Function:
+def front_pressure(space: Space) -> wp.Function:
     """(cell, tr L there, frame ∇ξ, auxiliary nodes, nodes, χ(1 − C²), Δt) → q [Pa], a tension."""
-    types, real = node_types(continuum, precision), precision.real
-    corners = 2**continuum.dim
+    types, real = space.types, space.real
+    corners = 2**space.dim
 
     @wp.func
     def pressure(
@@ -40,7 +38,7 @@ def front_pressure(continuum: Continuum, precision: Precision) -> wp.Function:
             own = wp.trace(nodes.velocity_gradient[auxiliary.cell[a, k]])
             mean += own / real(corners)
             largest = wp.max(largest, wp.abs(own))
-        for b in range(wp.static(continuum.dim)):
+        for b in range(wp.static(space.dim)):
             per_width2 = wp.max(per_width2, wp.length_sq(frame[b]))
         if largest * per_width2 * dt <= real(0.0):
             return real(0.0)

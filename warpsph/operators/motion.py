@@ -14,13 +14,9 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.linear_algebra import determinant_of
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
-from ..physics.unknowns import unknowns
+from ..physics.space import Space
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
-from ..state.nodes import node_types
 
 
 @dataclass(frozen=True)
@@ -49,17 +45,17 @@ class Motion:
         outdated: one integer, set once some node has used up its half of the skin since `mark`.
     """
 
-    def __init__(self, scene: Scene, skin: float, precision: Precision, launcher: Launcher, outdated: wp.array):
-        device, continuum, n = launcher.device, scene.mesh.continuum, len(scene.mesh.nodes)
-        types = node_types(continuum, precision)
+    def __init__(self, scene: Scene, skin: float, space: Space, launcher: Launcher, outdated: wp.array):
+        device, n = launcher.device, len(scene.mesh.nodes)
+        types = space.types
         self._support, self._skin = KERNELS[scene.numerics.kernel].support, skin
         self._reference_density = scene.material.density
         self._initial_smoothing_length: wp.array | None = None
         self._listed = wp.zeros(n, dtype=types.vector, device=device)
-        self._listed_h = wp.zeros(n, dtype=precision.real, device=device)
+        self._listed_h = wp.zeros(n, dtype=space.real, device=device)
         self._launcher, self._outdated = launcher, outdated
-        self._kernel = _move_kernel(continuum, precision)
-        self._centre = centre_kernel(continuum, precision)
+        self._kernel = _move_kernel(space)
+        self._centre = centre_kernel(space)
         self.kernels = (self._kernel, self._centre)
 
     def mark(self, nodes, auxiliary) -> None:
@@ -83,11 +79,11 @@ class Motion:
 
 
 @cache
-def half_step_gradient(continuum: Continuum, precision: Precision) -> wp.Function:
+def half_step_gradient(space: Space) -> wp.Function:
     """(∇φ in the configuration of tⁿ, Δt) → (∇φ in that of t^{n+1/2}, its volume over that of tⁿ)."""
-    dim, real, phi = continuum.dim, precision.real, unknowns(continuum, precision)
-    velocity_gradient, determinant = phi.velocity_gradient, determinant_of(dim, precision)
-    identity = precision.mat(dim, dim)(np.eye(dim))
+    dim, real, phi = space.dim, space.real, space.phi
+    velocity_gradient, determinant = phi.velocity_gradient, space.algebra.determinant
+    identity = space.mat(dim, dim)(np.eye(dim))
 
     @wp.func
     def to_half_step(gradient: phi.gradient, dt: real):
@@ -101,9 +97,9 @@ def half_step_gradient(continuum: Continuum, precision: Precision) -> wp.Functio
 
 
 @cache
-def initial_gradient(continuum: Continuum, precision: Precision) -> wp.Function:
+def initial_gradient(space: Space) -> wp.Function:
     """The same for small displacements: the initial configuration is the only one."""
-    phi, real = unknowns(continuum, precision), precision.real
+    phi, real = space.phi, space.real
 
     @wp.func
     def unchanged(gradient: phi.gradient, dt: real):
@@ -113,11 +109,11 @@ def initial_gradient(continuum: Continuum, precision: Precision) -> wp.Function:
 
 
 @cache
-def _move_kernel(continuum: Continuum, precision: Precision):
-    types = node_types(continuum, precision)
-    real, vector, MaterialNodes = precision.real, types.vector, types.MaterialNodes
-    dim = continuum.dim
-    determinant = determinant_of(dim, precision)
+def _move_kernel(space: Space):
+    types = space.types
+    real, vector, MaterialNodes = space.real, types.vector, types.MaterialNodes
+    dim = space.dim
+    determinant = space.algebra.determinant
     identity = types.tensor(np.eye(dim))
 
     @forward_kernel
@@ -154,12 +150,12 @@ def _move_kernel(continuum: Continuum, precision: Precision):
 
 
 @cache
-def centre_kernel(continuum: Continuum, precision: Precision):
+def centre_kernel(space: Space):
     """Places auxiliary nodes in the middle of their cells, with mean volume, density and smoothing length."""
-    types = node_types(continuum, precision)
-    real, vector = precision.real, types.vector
+    types = space.types
+    real, vector = space.real, types.vector
     MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
-    corners = 2**continuum.dim
+    corners = 2**space.dim
 
     @forward_kernel
     def centre(first: int, nodes: MaterialNodes, auxiliary: AuxiliaryNodes):

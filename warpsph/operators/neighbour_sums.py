@@ -16,13 +16,10 @@ from functools import cache
 import warp as wp
 
 from ..device.arrays import natural, packed
-from ..device.linear_algebra import symmetric_inverse
-from ..device.precision import Precision
 from ..device.rows import add_outer
-from ..mesh.continuum import Continuum
 from ..physics.smoothing import SMOOTHING_FUNCTIONS
+from ..physics.space import Space
 from ..scene.numerics import KERNELS
-from ..state.nodes import node_types
 from ..state.pairs import PairList
 
 
@@ -64,18 +61,22 @@ def batch_on(device: wp.Device) -> int:
 
 
 @cache
-def sweep(continuum: Continuum, precision: Precision, kernel: str, batch: int = CPU_BATCH) -> Sweep:
+def sweep(space: Space, kernel: str, batch: int = CPU_BATCH) -> Sweep:
     """The pass for one smoothing function, with so many neighbours' weights found at a time.
 
     Loops are written with `while` and without branches, since that is what compilers turn into SIMD.
     """
-    types = node_types(continuum, precision)
-    real, vector, tensor, phi = precision.real, types.vector, types.tensor, types.phi
-    Point, dim, length = types.Point, continuum.dim, continuum.dim + types.size
-    row, rows, with_outer = precision.vec(length), precision.mat(dim, length), add_outer(dim, length, precision)
-    real_batch = precision.vec(batch)
-    weights = SMOOTHING_FUNCTIONS[kernel](precision)
-    inverse = symmetric_inverse(continuum.dim, precision)
+    types = space.types
+    real, vector, tensor, phi = space.real, types.vector, types.tensor, types.phi
+    Point, dim, length = types.Point, space.dim, space.dim + types.size
+    row, rows, with_outer = (
+        space.vec(length),
+        space.mat(dim, length),
+        add_outer(dim, length, space.precision),
+    )
+    real_batch = space.vec(batch)
+    weights = SMOOTHING_FUNCTIONS[kernel](space.precision)
+    inverse = space.algebra.symmetric_inverse
     support_squared = EDGE * KERNELS[kernel].support ** 2
     packed_points, packed_volumes, packed_list = (
         packed(arrays) for arrays in (wp.array(dtype=Point), wp.array(dtype=real), PairList)

@@ -16,14 +16,9 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.linear_algebra import rotation_of
-from ..device.precision import Precision
 from ..materials.law import Law
-from ..mesh.continuum import Continuum
-from ..physics.stress import kinematics
-from ..physics.unknowns import unknowns
+from ..physics.space import Space
 from ..scene.scene import Scene
-from ..state.nodes import node_types
 
 # RK4 is stable up to 2.785 (METHOD section 3), where it no longer damps at all; half of that follows the
 # exponential to 10 %, and no sub-step overshoots the yield surface.
@@ -50,16 +45,14 @@ class Sources:
         integrator: one of `STRESS_INTEGRATORS`.
     """
 
-    def __init__(self, scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher, integrator):
-        continuum = scene.mesh.continuum
+    def __init__(self, scene: Scene, law: Law, parameters, space: Space, launcher: Launcher, integrator):
         self._parameters, self._launcher = parameters, launcher
         self._damping = scene.damping
         flows, turns = law.flow is not None, spins(scene)
         self._kernel = source_kernel(
-            continuum,
-            precision,
+            space,
             law,
-            integrator(continuum, precision, law, turns) if flows or turns else None,
+            integrator(space, law, turns) if flows or turns else None,
             accelerates=scene.body_force is not None or scene.damping > 0.0,
         )
         self.kernels = (self._kernel,)
@@ -81,25 +74,25 @@ def spins(scene: Scene) -> bool:
     return scene.large_displacements and scene.mesh.dim > 1
 
 
-def sources(scene: Scene, law: Law, parameters, precision: Precision, launcher: Launcher) -> Sources | NoSources:
+def sources(scene: Scene, law: Law, parameters, space: Space, launcher: Launcher) -> Sources | NoSources:
     """The sources of a scene by the scheme it names; an object that does nothing when it has none."""
     if law.flow is None and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
         return NoSources()
-    return Sources(scene, law, parameters, precision, launcher, STRESS_INTEGRATORS[scene.numerics.source_scheme])
+    return Sources(scene, law, parameters, space, launcher, STRESS_INTEGRATORS[scene.numerics.source_scheme])
 
 
-def history_type(law: Law, precision: Precision) -> type:
+def history_type(law: Law, space: Space) -> type:
     """Vector of a law's internal variables; Warp has no empty vectors, so one spare zero where there are none."""
-    return precision.vec(max(len(law.history), 1))
+    return space.vec(max(len(law.history), 1))
 
 
 @cache
-def analytic(continuum: Continuum, precision: Precision, law: Law, spins: bool) -> wp.Function:
+def analytic(space: Space, law: Law, spins: bool) -> wp.Function:
     """(σ, history, L, material, Δt) → (σ, history): exact rotation, and the law's relaxation where it has flow."""
-    types, internal = node_types(continuum, precision), history_type(law, precision)
-    real, Parameters = precision.real, law.Parameters
-    rotation = rotation_of(continuum.dim, precision)
-    transform, relax, flows = kinematics(continuum, precision).transform, law.relax, law.flow is not None
+    types, internal = space.types, history_type(law, space)
+    real, Parameters = space.real, law.Parameters
+    rotation = space.algebra.rotation
+    transform, relax, flows = space.stress.transform, law.relax, law.flow is not None
 
     @wp.func
     def advance(sigma: types.stress, history: internal, L: types.tensor, material: Parameters, dt: real):
@@ -115,11 +108,11 @@ def analytic(continuum: Continuum, precision: Precision, law: Law, spins: bool) 
 
 
 @cache
-def rk4(continuum: Continuum, precision: Precision, law: Law, spins: bool) -> wp.Function:
+def rk4(space: Space, law: Law, spins: bool) -> wp.Function:
     """(σ, history, L, material, Δt) → (σ, history) by RK4, sub-stepped as the stiffness of the flow asks."""
-    types, internal = node_types(continuum, precision), history_type(law, precision)
-    real, stress, tensor = precision.real, types.stress, types.tensor
-    spin, Parameters = kinematics(continuum, precision).spin, law.Parameters
+    types, internal = space.types, history_type(law, space)
+    real, stress, tensor = space.real, types.stress, types.tensor
+    spin, Parameters = space.stress.spin, law.Parameters
     flow, flow_stiffness, flows = law.flow, law.flow_stiffness, law.flow is not None
 
     @wp.func
@@ -172,17 +165,16 @@ STRESS_INTEGRATORS = {"rk4": rk4, "analytic": analytic}
 
 @cache
 def source_kernel(
-    continuum: Continuum,
-    precision: Precision,
+    space: Space,
     law: Law,
     advance_stress: wp.Function | None,
     accelerates: bool,
 ):
     """The kernel that applies the sources a scene has, and no others."""
     m, acts_on_stress = len(law.history), advance_stress is not None
-    types, phi = node_types(continuum, precision), unknowns(continuum, precision)
+    types, phi = space.types, space.phi
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    real, vector, internal = precision.real, types.vector, history_type(law, precision)
+    real, vector, internal = space.real, types.vector, history_type(law, space)
     Parameters, MaterialNodes = law.Parameters, types.MaterialNodes
 
     @wp.func

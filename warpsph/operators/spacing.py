@@ -12,10 +12,8 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.precision import Precision
 from ..device.reduction import LargestMagnitude
-from ..mesh.continuum import Continuum
-from ..state.nodes import node_types
+from ..physics.space import Space
 from .cell_means import edges_function, frame_function
 
 # A step is not shortened beyond this share, or a run in which cells fold would never end.
@@ -30,10 +28,10 @@ class Spacing:
         m: number of cells.
     """
 
-    def __init__(self, m: int, continuum: Continuum, precision: Precision, launcher: Launcher):
-        self._launcher, self._kernel = launcher, _spacing_kernel(continuum, precision)
-        self._rate = wp.zeros(m, dtype=precision.real, device=launcher.device)
-        self._largest = LargestMagnitude(m, precision, launcher)
+    def __init__(self, m: int, space: Space, launcher: Launcher):
+        self._launcher, self._kernel = launcher, _spacing_kernel(space)
+        self._rate = wp.zeros(m, dtype=space.real, device=launcher.device)
+        self._largest = LargestMagnitude(m, space.precision, launcher)
         self._initial: float | None = None
         self.kernels = (self._kernel, *self._largest.kernels)
 
@@ -47,9 +45,9 @@ class Spacing:
 
 
 @cache
-def _spacing_kernel(continuum: Continuum, precision: Precision):
-    types, real = node_types(continuum, precision), precision.real
-    edges_of, frame_of = edges_function(continuum, precision), frame_function(continuum, precision)
+def _spacing_kernel(space: Space):
+    types, real = space.types, space.real
+    edges_of, frame_of = edges_function(space), frame_function(space)
 
     @forward_kernel
     def spacing(

@@ -15,7 +15,7 @@ from ..mesh.continuum import Continuum
 
 
 @dataclass(frozen=True)
-class Kinematics:
+class StressFunctions:
     """The pure functions of one continuum in one precision.
 
     Attributes:
@@ -40,12 +40,12 @@ class Kinematics:
 
 
 @cache
-def kinematics(continuum: Continuum, precision: Precision) -> Kinematics:
+def stress_functions(continuum: Continuum, precision: Precision) -> StressFunctions:
     """The functions of a continuum."""
-    return _KINEMATICS[continuum.name](precision)
+    return _OF_CONTINUUM[continuum.name](precision)
 
 
-def _bar(precision: Precision) -> Kinematics:
+def _bar(precision: Precision) -> StressFunctions:
     """Uniaxial stress: one velocity, one stress, modulus E."""
     real, stress, vector = precision.real, precision.vec(1), precision.vec(1)
     matrix = precision.mat(1, 1)
@@ -82,10 +82,10 @@ def _bar(precision: Precision) -> Kinematics:
     def norm(sigma: stress):
         return wp.abs(sigma[0])
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+    return StressFunctions(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
-def _plane_strain(precision: Precision) -> Kinematics:
+def _plane_strain(precision: Precision) -> StressFunctions:
     """Two velocities; stresses 11, 22, 12, 33 with d33 = 0."""
     real, stress, vector = precision.real, precision.vec(4), precision.vec(2)
     matrix, gradient = precision.mat(2, 2), precision.mat(4, 2)
@@ -137,10 +137,10 @@ def _plane_strain(precision: Precision) -> Kinematics:
     def norm(sigma: stress):
         return wp.sqrt(wp.dot(sigma, sigma) + sigma[2] * sigma[2])
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+    return StressFunctions(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
-def _solid(precision: Precision) -> Kinematics:
+def _solid(precision: Precision) -> StressFunctions:
     """Three velocities; stresses 11, 22, 33, 12, 13, 23."""
     real, stress, vector = precision.real, precision.vec(6), precision.vec(3)
     matrix, gradient = precision.mat(3, 3), precision.mat(6, 3)
@@ -199,10 +199,10 @@ def _solid(precision: Precision) -> Kinematics:
         shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
         return wp.sqrt(wp.dot(sigma, sigma) + shear2)
 
-    return Kinematics(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
+    return StressFunctions(elastic_rate, divergence, spin, von_mises, relaxation, spherical, transform, norm)
 
 
-_KINEMATICS: dict[str, Callable[[Precision], Kinematics]] = {
+_OF_CONTINUUM: dict[str, Callable[[Precision], StressFunctions]] = {
     "bar": _bar,
     "plane_strain": _plane_strain,
     "solid": _solid,

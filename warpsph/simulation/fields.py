@@ -11,6 +11,7 @@ from ..device.precision import PRECISIONS
 from ..materials import law
 from ..mesh.continuum import Continuum
 from ..mesh.mesh import Mesh
+from ..physics.space import Space
 from ..scene.material import PerzynaVonMises
 from ..scene.scene import Scene
 
@@ -153,7 +154,7 @@ def fields_of(scene: Scene) -> dict[str, Field]:
 
 def internal_variables(scene: Scene) -> dict[str, Field]:
     """What the nodes of a scene remember of their material, by name."""
-    history = law(scene.material, scene.mesh.continuum, PRECISIONS["float64"]).history
+    history = law(scene.material, Space(scene.mesh.continuum, PRECISIONS["float64"])).history
     return {
         name: Field(unit, "(n,)", meaning, lambda s, k=k: s.history.numpy()[:, k].copy())
         for k, (name, unit, meaning) in enumerate(history)

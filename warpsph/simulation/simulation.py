@@ -13,6 +13,7 @@ import numpy as np
 from ..device.launching import Launcher
 from ..device.precision import precision as precision_of
 from ..errors import NonFiniteError, SceneError, one_of
+from ..physics.space import Space
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
 from ..step.step import Stepper
@@ -80,7 +81,7 @@ class Simulation:
         self._initial_limit = time_step_limit(scene)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        self._stepper = Stepper(scene, self.precision, launcher)
+        self._stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
         self.history, self.conditions = self._stepper.history, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0

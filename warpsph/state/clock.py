@@ -14,8 +14,7 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.precision import Precision
-from ..mesh.continuum import Continuum
+from ..physics.space import Space
 
 LONGEST_RUN = 256  # steps
 HALF, END = 0, 1  # rows of `Clock.drive`
@@ -51,11 +50,10 @@ class Clock:
         self,
         body_force: Callable[[float], np.ndarray] | None,
         functions: Sequence,
-        continuum: Continuum,
-        precision: Precision,
+        space: Space,
         launcher: Launcher,
     ):
-        vector, real, device = precision.vec(continuum.dim), precision.real, launcher.device
+        vector, real, device = space.vec(space.dim), space.real, launcher.device
         self._launcher, self._body_force, self._functions = launcher, body_force, functions
         columns = max(1, len(functions))
         self._forces = wp.zeros((LONGEST_RUN, STAGES), dtype=vector, device=device)
@@ -68,7 +66,7 @@ class Clock:
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
         self.first_half, self.second_half = self._force[:3], self._force[2:]
         self.lists_outdated, self.surface_outdated, self.non_finite = (self._status[k : k + 1] for k in (2, 3, 4))
-        self._tick = _tick_kernel(continuum, precision)
+        self._tick = _tick_kernel(space)
         self.kernels = (self._tick,)
 
     def begin(self, times: Sequence[float], dt: float) -> None:
@@ -112,8 +110,8 @@ def put(array: wp.array, values) -> None:
 
 
 @cache
-def _tick_kernel(continuum: Continuum, precision: Precision):
-    vector, real = precision.vec(continuum.dim), precision.real
+def _tick_kernel(space: Space):
+    vector, real = space.vec(space.dim), space.real
 
     @forward_kernel
     def tick(

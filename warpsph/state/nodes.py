@@ -1,88 +1,14 @@
 """The two node sets: material nodes carry the mass, auxiliary nodes stand in the middle of their cells."""
 
-from dataclasses import dataclass
-from functools import cache
-
 import numpy as np
 import warp as wp
 
-from ..device.precision import Precision
 from ..materials.law import Law
-from ..mesh.continuum import Continuum
+from ..physics.space import Space
 from ..scene.scene import Scene
 
 
-@dataclass(frozen=True)
-class NodeTypes:
-    """Warp types of the node sets of one continuum in one precision.
-
-    Attributes:
-        size: length of φ = (v, σ), d + s.
-        vector, stress, phi: Warp vectors of length d, s and d + s.
-        tensor: d × d matrix.
-        phi_gradient: (d + s) × d matrix, ∂φ_k/∂x_l.
-        Point: what a neighbour is asked for, packed since one gather is cheaper than two: position x [m] and
-            unknowns φ = (v [m/s], σ [Pa]). 8 values in the plane and 12 in space suit wide loads; with the volume
-            in it they would not.
-        MaterialNodes, AuxiliaryNodes: structs of arrays, see `material_nodes` and `auxiliary_nodes`.
-    """
-
-    size: int
-    vector: type
-    stress: type
-    phi: type
-    tensor: type
-    phi_gradient: type
-    Point: type
-    MaterialNodes: type
-    AuxiliaryNodes: type
-
-
-@cache
-def node_types(continuum: Continuum, precision: Precision) -> NodeTypes:
-    """The types of the node sets."""
-    d, s = continuum.dim, continuum.stress_size
-    real, vector, tensor = precision.real, precision.vec(d), precision.mat(d, d)
-
-    @wp.struct
-    class Point:
-        x: vector
-        phi: precision.vec(d + s)
-
-    @wp.struct
-    class MaterialNodes:
-        point: wp.array(dtype=Point)
-        volume: wp.array(dtype=real)
-        reference: wp.array(dtype=vector)
-        displacement: wp.array(dtype=vector)
-        density: wp.array(dtype=real)
-        smoothing_length: wp.array(dtype=real)
-        weight: wp.array(dtype=real)
-        half_velocity: wp.array(dtype=vector)
-        velocity_gradient: wp.array(dtype=tensor)
-
-    @wp.struct
-    class AuxiliaryNodes:
-        point: wp.array(dtype=Point)
-        volume: wp.array(dtype=real)
-        density: wp.array(dtype=real)
-        smoothing_length: wp.array(dtype=real)
-        cell: wp.array2d(dtype=wp.int32)
-
-    return NodeTypes(
-        size=d + s,
-        vector=vector,
-        stress=precision.vec(s),
-        phi=precision.vec(d + s),
-        tensor=tensor,
-        phi_gradient=precision.mat(d + s, d),
-        Point=Point,
-        MaterialNodes=MaterialNodes,
-        AuxiliaryNodes=AuxiliaryNodes,
-    )
-
-
-def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device: wp.Device):
+def material_nodes(scene: Scene, space: Space, device: wp.Device):
     """The material nodes of a scene in its initial state, as a `MaterialNodes` struct.
 
     Its arrays, one entry a node: `point`; `volume` V [mᵈ] in sums over neighbours; `reference`, the initial
@@ -91,7 +17,7 @@ def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device:
     `half_velocity` v^{n+1/2} [m/s]; `velocity_gradient` L [1/s] of v^{n+1/2}, which turns the stresses in the
     source steps.
     """
-    mesh, density = scene.mesh, scene.material.density
+    mesh, density, types = scene.mesh, scene.material.density, space.types
     n = len(mesh.nodes)
     _, volume = mesh.node_volumes()
     point = np.zeros(n, dtype=types.Point.numpy_dtype())
@@ -103,12 +29,12 @@ def material_nodes(scene: Scene, types: NodeTypes, precision: Precision, device:
         return wp.array(values, dtype=dtype, device=device)
 
     nodes.point = array(point, types.Point)
-    nodes.volume = array(volume, precision.real)
+    nodes.volume = array(volume, space.real)
     nodes.reference = array(mesh.nodes, types.vector)
     nodes.displacement = wp.zeros(n, dtype=types.vector, device=device)
-    nodes.density = array(np.full(n, density), precision.real)
-    nodes.smoothing_length = array(initial_smoothing_length(scene, volume), precision.real)
-    nodes.weight = array(density * volume, precision.real)
+    nodes.density = array(np.full(n, density), space.real)
+    nodes.smoothing_length = array(initial_smoothing_length(scene, volume), space.real)
+    nodes.weight = array(density * volume, space.real)
     nodes.half_velocity = array(scene.initial_velocity, types.vector)
     nodes.velocity_gradient = wp.zeros(n, dtype=types.tensor, device=device)
     return nodes
@@ -128,24 +54,24 @@ def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     return ratio * largest
 
 
-def material_history(n: int, law: Law, precision: Precision, device: wp.Device) -> wp.array | None:
+def material_history(n: int, law: Law, space: Space, device: wp.Device) -> wp.array | None:
     """The internal variables of the material nodes, zero; None for a law without any."""
     if not law.history:
         return None
-    return wp.zeros(n, dtype=precision.vec(len(law.history)), device=device)
+    return wp.zeros(n, dtype=space.vec(len(law.history)), device=device)
 
 
-def auxiliary_nodes(scene: Scene, types: NodeTypes, precision: Precision, device: wp.Device):
+def auxiliary_nodes(scene: Scene, space: Space, device: wp.Device):
     """The auxiliary nodes, as an `AuxiliaryNodes` struct, still to be centred in their cells.
 
     Its arrays, one entry a node: `point`; `volume`, `density` and `smoothing_length`, means over the cell's nodes
     as its position is; `cell`, the indices of those nodes, shape (m, 2ᵈ).
     """
     cells = scene.mesh.cells
-    auxiliary = types.AuxiliaryNodes()
-    auxiliary.point = wp.zeros(len(cells), dtype=types.Point, device=device)
-    auxiliary.volume = wp.zeros(len(cells), dtype=precision.real, device=device)
-    auxiliary.density = wp.zeros(len(cells), dtype=precision.real, device=device)
-    auxiliary.smoothing_length = wp.zeros(len(cells), dtype=precision.real, device=device)
+    auxiliary = space.types.AuxiliaryNodes()
+    auxiliary.point = wp.zeros(len(cells), dtype=space.types.Point, device=device)
+    auxiliary.volume = wp.zeros(len(cells), dtype=space.real, device=device)
+    auxiliary.density = wp.zeros(len(cells), dtype=space.real, device=device)
+    auxiliary.smoothing_length = wp.zeros(len(cells), dtype=space.real, device=device)
     auxiliary.cell = wp.array(cells, dtype=wp.int32, device=device)
     return auxiliary

@@ -16,10 +16,9 @@ import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
-from ..device.precision import PRECISIONS, Precision
+from ..device.precision import PRECISIONS
 from ..device.reduction import LargestMagnitude
-from ..mesh.continuum import Continuum
-from .nodes import node_types
+from ..physics.space import Space
 
 SKIN = 0.25
 """Skin in lattice spacings. With the default support of 1.8 spacings the radius 2.05 still ends before the next
@@ -38,7 +37,7 @@ class Neighbours:
     """The pair list of the sources around each target.
 
     Args:
-        continuum, precision: what the points are.
+        space: what the points are.
         launcher: launches the kernels that make it.
         targets, sources: node structs (material or auxiliary).
         support: radius of the support in smoothing lengths.
@@ -50,19 +49,19 @@ class Neighbours:
         kernels: the kernels that make it.
     """
 
-    def __init__(self, continuum, precision, launcher, targets, sources, support, spacing, skin):
+    def __init__(self, space, launcher, targets, sources, support, spacing, skin):
         self.pairs = PairList()
         self._launcher, self._targets, self._sources = launcher, targets, sources
         self._support, self._skin, self._spacing = support, skin, spacing
-        self._kernels = _list_kernels(continuum, precision)
+        self._kernels = _list_kernels(space)
         device, n, m = sources.point.device, targets.point.shape[0], sources.point.shape[0]
         self._origin = np.array(sources.point.numpy()["x"].mean(axis=0), dtype=float)
         self._grid_points = wp.zeros(m, dtype=wp.vec3, device=device)
-        self._grid = wp.HashGrid(*_grid_size(sources, spacing, continuum.dim), device=device)
+        self._grid = wp.HashGrid(*_grid_size(sources, spacing, space.dim), device=device)
         self._counts = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self.pairs.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self._extent = LargestMagnitude(3 * m, PRECISIONS["float32"], launcher)
-        self._largest_h = LargestMagnitude(n, precision, launcher)
+        self._largest_h = LargestMagnitude(n, space.precision, launcher)
         self.kernels = (
             *(self._kernels.copy_points, self._kernels.count, self._kernels.fill),
             *(*self._extent.kernels, *self._largest_h.kernels),
@@ -106,10 +105,10 @@ class _Kernels:
 
 
 @cache
-def _list_kernels(continuum: Continuum, precision: Precision) -> _Kernels:
-    types = node_types(continuum, precision)
-    Point, vector, real = types.Point, types.vector, precision.real
-    dim = continuum.dim
+def _list_kernels(space: Space) -> _Kernels:
+    types = space.types
+    Point, vector, real = types.Point, types.vector, space.real
+    dim = space.dim
 
     @wp.func
     def grid_point(x: vector, origin: vector):

@@ -19,21 +19,17 @@ import warp as wp
 from ..device.arrays import packed
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.precision import Precision
 from ..materials.law import Law
-from ..mesh.continuum import Continuum
 from ..operators.cell_means import apart_on, cell_types
 from ..operators.checkerboard import taken_off
 from ..operators.conditions import ConditionTypes
 from ..operators.front import STRENGTH, front_pressure
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import Sweep, batch_on, sweep
-from ..physics.stress import kinematics
-from ..physics.unknowns import unknowns
+from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scene import Scene
 from ..state.clock import HALF, put
-from ..state.nodes import node_types
 from ..state.pairs import PairList
 
 # θ of the velocity: the share of its checkerboard taken off in a step. It costs little: with 20 cells a half
@@ -85,23 +81,19 @@ class CompatibleFluxes:
         kernels: the kernels of the two sweeps.
     """
 
-    def __init__(
-        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
-    ):
+    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, space: Space, launcher: Launcher):
         mesh, kernel = scene.mesh, scene.numerics.kernel
-        continuum, moves = mesh.continuum, scene.large_displacements
+        moves = scene.large_displacements
         ratio = scene.numerics.smoothing_ratio
         device = launcher.device
         apart = apart_on(device)
         self._launcher = launcher
         self._dim, self._reach = mesh.dim, scene.numerics.support
-        self._front, self._share = (wp.zeros(1, dtype=precision.real, device=device) for _ in range(2))
-        self._cells = cell_types(continuum, precision, apart).new(mesh, device)
-        parts = sweep(continuum, precision, kernel, batch_on(device))
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, ratio, law, apart)
-        self._to_nodes = _to_nodes_kernel(
-            continuum, precision, parts, ratio, law.Parameters, moves, conditions, apart
-        )
+        self._front, self._share = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
+        self._cells = cell_types(space, apart).new(mesh, device)
+        parts = sweep(space, kernel, batch_on(device))
+        self._to_auxiliary = _to_auxiliary_kernel(space, parts, ratio, law, apart)
+        self._to_nodes = _to_nodes_kernel(space, parts, ratio, law.Parameters, moves, conditions, apart)
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
     def set_courant(self, courant: float) -> None:
@@ -122,21 +114,19 @@ class CompatibleFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(
-    continuum: Continuum, precision: Precision, parts: Sweep, ratio: float, law: Law, apart: bool
-):
-    Parameters, relax, internal = law.Parameters, law.relax, precision.vec(max(1, len(law.history)))
-    corners = 2**continuum.dim
-    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision, apart)
-    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
+def _to_auxiliary_kernel(space: Space, parts: Sweep, ratio: float, law: Law, apart: bool):
+    Parameters, relax, internal = law.Parameters, law.relax, space.vec(max(1, len(law.history)))
+    corners = 2**space.dim
+    types, cells_types = space.types, cell_types(space, apart)
+    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
     Cells, describe, write = cells_types.Cells, cells_types.describe, cells_types.write
-    phi_of, spherical = unknowns(continuum, precision), kinematics(continuum, precision).spherical
+    phi_of, spherical = space.phi, space.stress.spherical
     join, velocity_gradient, vector = phi_of.join, phi_of.velocity_gradient, types.vector
     velocity, stress, tensor = phi_of.velocity, phi_of.stress, types.tensor
-    elastic_rate = kinematics(continuum, precision).elastic_rate
-    rate = wave_rate(continuum, precision, Parameters)
+    elastic_rate = space.stress.elastic_rate
+    rate = wave_rate(space, Parameters)
     metric_of = parts.cell_metric(ratio)
-    collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(continuum, precision)
+    collect, gradient, front_pressure_at = parts.collect, parts.gradient, front_pressure(space)
 
     packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
 
@@ -181,8 +171,7 @@ def _to_auxiliary_kernel(
 
 @cache
 def _to_nodes_kernel(
-    continuum: Continuum,
-    precision: Precision,
+    space: Space,
     parts: Sweep,
     ratio: float,
     Parameters: type,
@@ -190,14 +179,14 @@ def _to_nodes_kernel(
     conditions: ConditionTypes,
     apart: bool,
 ):
-    types, cells_types = node_types(continuum, precision), cell_types(continuum, precision, apart)
-    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    phi = unknowns(continuum, precision)
+    types, cells_types = space.types, cell_types(space, apart)
+    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
+    phi = space.phi
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply, Cells, gather = conditions.Table, conditions.apply, cells_types.Cells, cells_types.gather
-    rate, taken_off_stress = wave_rate(continuum, precision, Parameters), taken_off(continuum, precision)
+    rate, taken_off_stress = wave_rate(space, Parameters), taken_off(space)
     collect, gradient, metric_of = parts.collect, parts.gradient, parts.cell_metric(ratio)
-    to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
+    to_half_step = half_step_gradient(space) if moves else initial_gradient(space)
 
     packed_nodes, packed_auxiliary = packed(MaterialNodes), packed(AuxiliaryNodes)
 

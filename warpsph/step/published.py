@@ -6,17 +6,14 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..device.precision import Precision
 from ..materials.law import Law
-from ..mesh.continuum import Continuum
 from ..operators.conditions import ConditionTypes
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import Sweep, batch_on, sweep
-from ..physics.unknowns import unknowns
+from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scene import Scene
 from ..state.clock import HALF
-from ..state.nodes import node_types
 from ..state.pairs import PairList
 from .velocity_schemes import VELOCITY_SCHEMES
 
@@ -33,16 +30,13 @@ class PublishedFluxes:
         kernels: the kernels of the two sweeps.
     """
 
-    def __init__(
-        self, scene: Scene, law: Law, conditions: ConditionTypes, precision: Precision, launcher: Launcher
-    ):
+    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, space: Space, launcher: Launcher):
         self._launcher = launcher
-        continuum, numerics = scene.mesh.continuum, scene.numerics
-        parts = sweep(continuum, precision, numerics.kernel, batch_on(launcher.device))
-        self._to_auxiliary = _to_auxiliary_kernel(continuum, precision, parts, law.Parameters)
+        numerics = scene.numerics
+        parts = sweep(space, numerics.kernel, batch_on(launcher.device))
+        self._to_auxiliary = _to_auxiliary_kernel(space, parts, law.Parameters)
         self._to_nodes = _to_nodes_kernel(
-            continuum,
-            precision,
+            space,
             parts,
             law.Parameters,
             numerics.velocity_scheme,
@@ -66,10 +60,10 @@ class PublishedFluxes:
 
 
 @cache
-def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Sweep, Parameters: type):
-    types = node_types(continuum, precision)
-    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    rate = wave_rate(continuum, precision, Parameters)
+def _to_auxiliary_kernel(space: Space, parts: Sweep, Parameters: type):
+    types = space.types
+    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
+    rate = wave_rate(space, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
 
@@ -95,24 +89,23 @@ def _to_auxiliary_kernel(continuum: Continuum, precision: Precision, parts: Swee
 
 @cache
 def _to_nodes_kernel(
-    continuum: Continuum,
-    precision: Precision,
+    space: Space,
     parts: Sweep,
     Parameters: type,
     scheme: str,
     moves: bool,
     conditions: ConditionTypes,
 ):
-    types = node_types(continuum, precision)
-    real, MaterialNodes, AuxiliaryNodes = precision.real, types.MaterialNodes, types.AuxiliaryNodes
-    phi = unknowns(continuum, precision)
+    types = space.types
+    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
+    phi = space.phi
     velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
     Table, apply = conditions.Table, conditions.apply
-    rate = wave_rate(continuum, precision, Parameters)
+    rate = wave_rate(space, Parameters)
     collect, value, gradient = parts.collect, parts.value, parts.gradient
     round_metric = parts.round_metric
-    advance_velocity = VELOCITY_SCHEMES[scheme](continuum.dim, precision)
-    to_half_step = half_step_gradient(continuum, precision) if moves else initial_gradient(continuum, precision)
+    advance_velocity = VELOCITY_SCHEMES[scheme](space)
+    to_half_step = half_step_gradient(space) if moves else initial_gradient(space)
 
     @forward_kernel
     def to_nodes(

@@ -6,13 +6,13 @@ import warp as wp
 
 from ..device.compiling import load_kernels
 from ..device.launching import Launcher, Recording
-from ..device.precision import Precision
 from ..materials import law as material_law
 from ..operators.cell_motion import CellMotion
 from ..operators.conditions import Conditions
 from ..operators.motion import Motion, NoMotion, centre_kernel
 from ..operators.sources import sources
 from ..operators.surface.release import FreeSurfaceConditions
+from ..physics.space import Space
 from ..scene.numerics import KERNELS
 from ..scene.scene import Scene
 from ..state.clock import Clock, Outcome
@@ -20,7 +20,6 @@ from ..state.nodes import (
     auxiliary_nodes,
     material_history,
     material_nodes,
-    node_types,
 )
 from ..state.pairs import SKIN, Neighbours
 from .fluxes import FLUXES
@@ -31,7 +30,7 @@ class Stepper:
 
     Args:
         scene: the scene.
-        precision: float32 or float64.
+        space: the continuum and the precision.
         launcher: launches the kernels.
 
     Attributes:
@@ -44,17 +43,16 @@ class Stepper:
         list_builds: how often the pair lists were built.
     """
 
-    def __init__(self, scene: Scene, precision: Precision, launcher: Launcher):
+    def __init__(self, scene: Scene, space: Space, launcher: Launcher):
         mesh, numerics, device = scene.mesh, scene.numerics, launcher.device
-        continuum, n = mesh.continuum, len(mesh.nodes)
-        types = node_types(continuum, precision)
-        law = material_law(scene.material, continuum, precision)
+        n = len(mesh.nodes)
+        law = material_law(scene.material, space)
         self._parameters = law.fill(scene.material)
-        self.nodes = material_nodes(scene, types, precision, device)
-        self.auxiliary = auxiliary_nodes(scene, types, precision, device)
-        self.history = material_history(n, law, precision, device)
+        self.nodes = material_nodes(scene, space, device)
+        self.auxiliary = auxiliary_nodes(scene, space, device)
+        self.history = material_history(n, law, space, device)
         functions = scene.boundary.functions
-        self.clock = Clock(scene.body_force, functions, continuum, precision, launcher)
+        self.clock = Clock(scene.body_force, functions, space, launcher)
         self._launcher, self._recording, self._recorded = launcher, None, None
 
         support, skin = KERNELS[numerics.kernel].support, 0.0
@@ -62,21 +60,21 @@ class Stepper:
         if scene.large_displacements:
             skin = SKIN * mesh.spacing
             moving = CellMotion if numerics.follows_cells else Motion
-            self._motion = moving(scene, skin, precision, launcher, self.clock.lists_outdated)
+            self._motion = moving(scene, skin, space, launcher, self.clock.lists_outdated)
         search = (support, mesh.spacing, skin)
         # Before the lists, whose grids are sized by where the nodes are.
-        centre = centre_kernel(continuum, precision)
+        centre = centre_kernel(space)
         load_kernels([centre], device)
         launcher.launch(centre, self.auxiliary.point, [self.nodes, self.auxiliary])
-        self._around_auxiliary = Neighbours(continuum, precision, launcher, self.auxiliary, self.nodes, *search)
-        self._around_nodes = Neighbours(continuum, precision, launcher, self.nodes, self.auxiliary, *search)
-        self._sources = sources(scene, law, self._parameters, precision, launcher)
+        self._around_auxiliary = Neighbours(space, launcher, self.auxiliary, self.nodes, *search)
+        self._around_nodes = Neighbours(space, launcher, self.nodes, self.auxiliary, *search)
+        self._sources = sources(scene, law, self._parameters, space, launcher)
         if scene.free_surface is None:
             turns = numerics.unloads and scene.large_displacements and mesh.dim > 1
-            self.conditions = Conditions(scene.boundary, n, continuum, precision, launcher, self.clock, turns)
+            self.conditions = Conditions(scene.boundary, n, space, launcher, self.clock, turns)
         else:
-            self.conditions = FreeSurfaceConditions(scene, self.nodes, precision, launcher, self.clock)
-        self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, precision, launcher)
+            self.conditions = FreeSurfaceConditions(scene, self.nodes, space, launcher, self.clock)
+        self._fluxes = FLUXES[numerics.velocity_scheme](scene, law, self.conditions.types, space, launcher)
         parts = (self.clock, self._around_nodes, self._sources, self._fluxes, self.conditions, self._motion)
         load_kernels([kernel for part in parts for kernel in part.kernels], device)
 

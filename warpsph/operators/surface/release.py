@@ -20,16 +20,11 @@ import warp as wp
 
 from ...device.compiling import forward_kernel
 from ...device.launching import Launcher
-from ...device.linear_algebra import rotation_of
-from ...device.precision import Precision
-from ...mesh.continuum import Continuum
 from ...physics.smoothing import wendland_c2
-from ...physics.stress import kinematics
-from ...physics.unknowns import unknowns
+from ...physics.space import Space
 from ...scene.resolve import SMOOTH_EDGE_ANGLE
 from ...scene.scene import Scene
 from ...state.clock import Clock
-from ...state.nodes import node_types
 from ...state.pairs import PairList
 from ..conditions import Conditions, ConditionTypes, apply_kernel, condition_types
 from .scan import SurfaceScan, surface_types
@@ -51,25 +46,25 @@ class FreeSurfaceConditions(Conditions):
         nodes: material nodes.
     """
 
-    def __init__(self, scene: Scene, nodes, precision: Precision, launcher: Launcher, clock: Clock):
+    def __init__(self, scene: Scene, nodes, space: Space, launcher: Launcher, clock: Clock):
         device, mesh, surface = launcher.device, scene.mesh, scene.free_surface
-        continuum, types = mesh.continuum, node_types(mesh.continuum, precision)
-        super().__init__(scene.boundary, len(mesh.nodes), continuum, precision, launcher, clock)
+        types = space.types
+        super().__init__(scene.boundary, len(mesh.nodes), space, launcher, clock)
         self._unmoved = ~surface.moved(mesh, scene.boundary)
         self._moves = scene.large_displacements
-        self._scan = SurfaceScan(scene, surface.candidates(mesh, scene.boundary), nodes, precision, launcher)
-        self.types = free_surface_types(continuum, precision)
+        self._scan = SurfaceScan(scene, surface.candidates(mesh, scene.boundary), nodes, space, launcher)
+        self.types = free_surface_types(space)
         self._b = self._scan.candidates.node.shape[0]
         walls, self.table = self.table, self.types.Table()
         self.table.conditions = walls
         self.table.row = self._scan.row
         self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
-        self.table.unloading = wp.array(_unloading(scene), dtype=precision.real, device=device)
-        self._turned = wp.zeros(self._b, dtype=precision.real, device=device)
+        self.table.unloading = wp.array(_unloading(scene), dtype=space.real, device=device)
+        self._turned = wp.zeros(self._b, dtype=space.real, device=device)
         self._outdated = clock.surface_outdated
-        self._kernel = apply_kernel(continuum, precision, self.types)
-        self._project = _project_kernel(continuum, precision)
-        self._turn = _turn_kernel(continuum, precision)
+        self._kernel = apply_kernel(space, self.types)
+        self._project = _project_kernel(space)
+        self._turn = _turn_kernel(space)
         self.kernels = (self._kernel, self._project, self._turn, *self._scan.kernels)
 
     def locate(self, nodes) -> None:
@@ -110,15 +105,15 @@ class FreeSurfaceConditions(Conditions):
 
 
 @cache
-def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionTypes:
+def free_surface_types(space: Space) -> ConditionTypes:
     """The conditions' table and function, with the free surface: P of each candidate after all else."""
-    phi, walls = unknowns(continuum, precision), condition_types(continuum, precision)
+    phi, walls = space.phi, condition_types(space)
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
     kin, types, dim, real = (
-        kinematics(continuum, precision),
-        node_types(continuum, precision),
-        continuum.dim,
-        precision.real,
+        space.stress,
+        space.types,
+        space.dim,
+        space.real,
     )
     apply_walls, transform, spherical = walls.apply, kin.transform, kin.spherical
     stress, tensor = types.stress, types.tensor
@@ -135,8 +130,8 @@ def free_surface_types(continuum: Continuum, precision: Precision) -> ConditionT
     class Table:
         conditions: walls.Table
         row: wp.array(dtype=wp.int32)
-        projector: wp.array(dtype=precision.mat(continuum.dim, continuum.dim))
-        unloading: wp.array(dtype=precision.real)
+        projector: wp.array(dtype=space.mat(space.dim, space.dim))
+        unloading: wp.array(dtype=space.real)
 
     @wp.func
     def released(sigma: stress, P: tensor, unloading: wp.array(dtype=real)):
@@ -166,11 +161,11 @@ def _unloading(scene: Scene) -> list[float]:
 
 
 @cache
-def _project_kernel(continuum: Continuum, precision: Precision):
-    types, surface = node_types(continuum, precision), surface_types(continuum, precision)
-    real, vector, tensor, dim = precision.real, types.vector, types.tensor, continuum.dim
-    Table, Candidates = free_surface_types(continuum, precision).Table, surface.Candidates
-    on_face, weights = surface.on_face, wendland_c2(precision)
+def _project_kernel(space: Space):
+    types, surface = space.types, surface_types(space)
+    real, vector, tensor, dim = space.real, types.vector, types.tensor, space.dim
+    Table, Candidates = free_surface_types(space).Table, surface.Candidates
+    on_face, weights = surface.on_face, wendland_c2(space.precision)
     identity, same_face, smooth = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE), math.cos(HALF_EDGE)
 
     @wp.func
@@ -235,10 +230,10 @@ def _project_kernel(continuum: Continuum, precision: Precision):
 
 
 @cache
-def _turn_kernel(continuum: Continuum, precision: Precision):
-    MaterialNodes, real = node_types(continuum, precision).MaterialNodes, precision.real
-    Table = free_surface_types(continuum, precision).Table
-    rotation = rotation_of(continuum.dim, precision)
+def _turn_kernel(space: Space):
+    MaterialNodes, real = space.types.MaterialNodes, space.real
+    Table = free_surface_types(space).Table
+    rotation = space.algebra.rotation
 
     @forward_kernel
     def turn(

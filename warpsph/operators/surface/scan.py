@@ -26,13 +26,10 @@ import warp as wp
 
 from ...device.compiling import forward_kernel
 from ...device.launching import Launcher
-from ...device.linear_algebra import symmetric_inverse
-from ...device.precision import Precision
-from ...mesh.continuum import Continuum
 from ...physics.smoothing import wendland_c2
+from ...physics.space import Space
 from ...scene.resolve import SMOOTH_EDGE_ANGLE
 from ...scene.scene import Scene
-from ...state.nodes import NodeTypes, node_types
 from ...state.pairs import Neighbours, PairList
 
 # The scan reaches 2 h_s, just as far as the support of this W, which is steep enough to tell a surface's normal
@@ -66,9 +63,9 @@ class SurfaceTypes:
 
 
 @cache
-def surface_types(continuum: Continuum, precision: Precision) -> SurfaceTypes:
+def surface_types(space: Space) -> SurfaceTypes:
     """The types of one continuum in one precision."""
-    types, real = node_types(continuum, precision), precision.real
+    types, real = space.types, space.real
     vector = types.vector
 
     @wp.struct
@@ -111,21 +108,21 @@ class SurfaceScan:
         kernels: the kernels that find the surface.
     """
 
-    def __init__(self, scene: Scene, candidates: np.ndarray, nodes, precision: Precision, launcher: Launcher):
-        continuum, n, b = scene.mesh.continuum, len(scene.mesh.nodes), len(candidates)
-        types, device = node_types(continuum, precision), launcher.device
+    def __init__(self, scene: Scene, candidates: np.ndarray, nodes, space: Space, launcher: Launcher):
+        n, b = len(scene.mesh.nodes), len(candidates)
+        device = launcher.device
         row = np.full(n, -1, dtype=np.int32)
         row[candidates] = np.arange(b, dtype=np.int32)
         self.row = wp.array(row, dtype=wp.int32, device=device)
-        self.candidates = _candidates(candidates, continuum, types, precision, device)
+        self.candidates = _candidates(candidates, space, device)
         self._ratio = scene.free_surface.scan_ratio
         spacing = scene.mesh.spacing
         search = (SCAN_SUPPORT, spacing, 0.0)
-        self._around = Neighbours(continuum, precision, launcher, self.candidates, nodes, *search)
+        self._around = Neighbours(space, launcher, self.candidates, nodes, *search)
         self.pairs = self._around.pairs
-        self._gather = _gather_kernel(continuum, precision)
-        self._scan = _scan_kernel(continuum, precision)
-        self._fit = _fit_kernel(continuum, precision)
+        self._gather = _gather_kernel(space)
+        self._scan = _scan_kernel(space)
+        self._fit = _fit_kernel(space)
         self.kernels = (self._gather, self._scan, self._fit, *self._around.kernels)
         self._improves = scene.free_surface.normals == "improved"
         if not self._improves:
@@ -141,15 +138,15 @@ class SurfaceScan:
             wp.launch(self._fit, b, [self.pairs, self.row, self.candidates], device=device)
 
 
-def _candidates(indices, continuum: Continuum, types: NodeTypes, precision: Precision, device: wp.Device):
-    candidates = surface_types(continuum, precision).Candidates()
+def _candidates(indices, space: Space, device: wp.Device):
+    candidates = surface_types(space).Candidates()
     candidates.node = wp.array(indices, dtype=wp.int32, device=device)
     for name, dtype in (
-        ("point", types.Point),
-        ("smoothing_length", precision.real),
-        ("scan_normal", types.vector),
+        ("point", space.types.Point),
+        ("smoothing_length", space.real),
+        ("scan_normal", space.types.vector),
         ("exposed", wp.int32),
-        ("normal", types.vector),
+        ("normal", space.types.vector),
         ("sharp", wp.int32),
     ):
         setattr(candidates, name, wp.zeros(len(indices), dtype=dtype, device=device))
@@ -157,26 +154,26 @@ def _candidates(indices, continuum: Continuum, types: NodeTypes, precision: Prec
 
 
 @cache
-def _gather_kernel(continuum: Continuum, precision: Precision):
-    real, MaterialNodes = precision.real, node_types(continuum, precision).MaterialNodes
-    Candidates = surface_types(continuum, precision).Candidates
+def _gather_kernel(space: Space):
+    real, MaterialNodes = space.real, space.types.MaterialNodes
+    Candidates = surface_types(space).Candidates
 
     @forward_kernel
     def gather(ratio: real, nodes: MaterialNodes, candidates: Candidates):
         c = wp.tid()
         i = candidates.node[c]
         candidates.point[c] = nodes.point[i]
-        spacing = wp.pow(nodes.volume[i], real(wp.static(1.0 / continuum.dim)))
+        spacing = wp.pow(nodes.volume[i], real(wp.static(1.0 / space.dim)))
         candidates.smoothing_length[c] = ratio * spacing
 
     return gather
 
 
 @cache
-def _scan_kernel(continuum: Continuum, precision: Precision):
-    types, Candidates = node_types(continuum, precision), surface_types(continuum, precision).Candidates
-    real, vector, tensor, MaterialNodes = precision.real, types.vector, types.tensor, types.MaterialNodes
-    weights, inverse = wendland_c2(precision), symmetric_inverse(continuum.dim, precision)
+def _scan_kernel(space: Space):
+    types, Candidates = space.types, surface_types(space).Candidates
+    real, vector, tensor, MaterialNodes = space.real, types.vector, types.tensor, types.MaterialNodes
+    weights, inverse = wendland_c2(space.precision), space.algebra.symmetric_inverse
 
     @wp.func
     def scan_normal(x: vector, h: real, start: int, end: int, pairs: PairList, nodes: MaterialNodes):
@@ -221,15 +218,15 @@ def _scan_kernel(continuum: Continuum, precision: Precision):
 
 
 @cache
-def _fit_kernel(continuum: Continuum, precision: Precision):
+def _fit_kernel(space: Space):
     """The kernel that fits normals to the neighbours on the surface."""
-    types, surface = node_types(continuum, precision), surface_types(continuum, precision)
-    real, vector, tensor = precision.real, types.vector, types.tensor
-    Candidates, on_face, weights = surface.Candidates, surface.on_face, wendland_c2(precision)
+    types, surface = space.types, surface_types(space)
+    real, vector, tensor = space.real, types.vector, types.tensor
+    Candidates, on_face, weights = surface.Candidates, surface.on_face, wendland_c2(space.precision)
     # Where two faces meet, all directions rise (or all fall) by half the angle between the faces; in a solid those
     # across the edge do, 2/π as much in the mean over all directions.
-    sharp_rise = math.sin(0.5 * SMOOTH_EDGE_ANGLE) * (1.0 if continuum.dim == 2 else 2.0 / math.pi)
-    identity = tensor(np.eye(continuum.dim))
+    sharp_rise = math.sin(0.5 * SMOOTH_EDGE_ANGLE) * (1.0 if space.dim == 2 else 2.0 / math.pi)
+    identity = tensor(np.eye(space.dim))
 
     @forward_kernel
     def fit(pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
