@@ -16,15 +16,15 @@ class Law:
     Attributes:
         Parameters: Warp struct type.
         fill: material → instance of `Parameters`.
-        history: name, unit and meaning of each internal variable a node keeps; each is a field of the nodes.
-        flow: (σ, history, Parameters) → (dσ/dt, d history/dt) by inelastic flow alone.
-        flow_stiffness: (σ, history, Parameters) → the rate λ [1/s] at which that flow decays, for the step limit.
-        relax: (σ, history, Parameters, Δt) → (σ, history) after that flow has acted for Δt, stable for any Δt.
+        internals: name, unit and meaning of each internal variable a node keeps; each is a field of the nodes.
+        flow: (σ, internals, Parameters) → (dσ/dt, d internals/dt) by inelastic flow alone.
+        flow_stiffness: (σ, internals, Parameters) → the rate λ [1/s] at which it decays, for the step limit.
+        relax: (σ, internals, Parameters, Δt) → (σ, internals) after that flow has acted for Δt, stable for any Δt.
     """
 
     Parameters: type
     fill: Callable[[object], object]
-    history: tuple[tuple[str, str, str], ...] = ()
+    internals: tuple[tuple[str, str, str], ...] = ()
     flow: wp.Function | None = None
     flow_stiffness: wp.Function | None = None
     relax: wp.Function | None = None

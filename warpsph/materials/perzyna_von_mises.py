@@ -54,9 +54,9 @@ def perzyna_von_mises(space: Space) -> Law:
         return wp.where(p.residual > Y, p.residual, Y)  # unlike a maximum, keeps a NaN
 
     @wp.func
-    def flow(sigma: stress, history: scalar, p: PerzynaParameters):
+    def flow(sigma: stress, internals: scalar, p: PerzynaParameters):
         q = von_mises(sigma)
-        Y = current_yield_size(history[0], p)
+        Y = current_yield_size(internals[0], p)
         rate = stress()
         eps_rate = scalar()
         if not q <= Y:  # a NaN flows, and shows
@@ -68,10 +68,10 @@ def perzyna_von_mises(space: Space) -> Law:
         return rate, eps_rate
 
     @wp.func
-    def flow_stiffness(sigma: stress, history: scalar, p: PerzynaParameters):
+    def flow_stiffness(sigma: stress, internals: scalar, p: PerzynaParameters):
         """A bound of the rate at which the overstress decays: (3G + |H| q/Y) γ N ⟨(q − Y)/Y⟩^{N−1}/Y."""
         q = von_mises(sigma)
-        Y = current_yield_size(history[0], p)
+        Y = current_yield_size(internals[0], p)
         modulus = real(3.0) * p.shear
         if wp.static(in_bar):
             modulus = p.young
@@ -93,12 +93,12 @@ def perzyna_von_mises(space: Space) -> Law:
         return over * wp.pow(real(1.0) + n * rate * wp.pow(over / Y, n), -real(1.0) / n)
 
     @wp.func
-    def relax(sigma: stress, history: scalar, p: PerzynaParameters, dt: real):
+    def relax(sigma: stress, internals: scalar, p: PerzynaParameters, dt: real):
         q = von_mises(sigma)
-        eps = history[0]
+        eps = internals[0]
         Y = current_yield_size(eps, p)
         if q <= Y:
-            return sigma, history
+            return sigma, internals
         modulus = real(3.0) * p.shear
         if wp.static(in_bar):
             modulus = p.young
@@ -117,14 +117,14 @@ def perzyna_von_mises(space: Space) -> Law:
             left = dt * (real(1.0) - softened / strain)
             over = over - b * softened
             strain = softened + (over - overstress_after(over, modulus, p.residual, p, left)) / modulus
-        history_new = history
-        history_new[0] = eps + strain
-        return sigma - strain * relaxation(sigma, q, p.shear, p.young), history_new
+        internals_new = internals
+        internals_new[0] = eps + strain
+        return sigma - strain * relaxation(sigma, q, p.shear, p.young), internals_new
 
     return Law(
         PerzynaParameters,
         fill,
-        history=(("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),),
+        internals=(("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),),
         flow=flow,
         flow_stiffness=flow_stiffness,
         relax=relax,

@@ -32,7 +32,7 @@ class NoSources:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def half_step(self, nodes, history, body_force: wp.array, dt: wp.array) -> None:
+    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array) -> None:
         """Nothing."""
 
 
@@ -57,15 +57,15 @@ class Sources:
         )
         self.kernels = (self._kernel,)
 
-    def half_step(self, nodes, history, body_force: wp.array, dt: wp.array) -> None:
+    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array) -> None:
         """Advance the nodes by their sources alone.
 
         Args:
-            nodes: material nodes; φ and the history are updated in place.
+            nodes: material nodes; φ and the internals are updated in place.
             body_force: b [m/s²] at the start, in the middle and at the end, on the device.
             dt: the time step [s], on the device.
         """
-        inputs = [self._parameters, body_force, self._damping, dt, nodes, history]
+        inputs = [self._parameters, body_force, self._damping, dt, nodes, internals]
         self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
@@ -81,23 +81,23 @@ def sources(scene: Scene, law: Law, parameters, space: Space, launcher: Launcher
     return Sources(scene, law, parameters, space, launcher, STRESS_INTEGRATORS[scene.numerics.source_scheme])
 
 
-def history_type(law: Law, space: Space) -> type:
+def internals_type(law: Law, space: Space) -> type:
     """Vector of a law's internal variables; Warp has no empty vectors, so one spare zero where there are none."""
-    return space.vec(max(len(law.history), 1))
+    return space.vec(max(len(law.internals), 1))
 
 
 @cache
 def analytic(space: Space, law: Law, spins: bool) -> wp.Function:
-    """(σ, history, L, material, Δt) → (σ, history): exact rotation, and the law's relaxation where it has flow."""
-    types, internal = space.types, history_type(law, space)
+    """(σ, internals, L, material, Δt) → the same after exact rotation and, with flow, the law's relaxation."""
+    types, internal = space.types, internals_type(law, space)
     real, Parameters = space.real, law.Parameters
     rotation = space.algebra.rotation
     transform, relax, flows = space.stress.transform, law.relax, law.flow is not None
 
     @wp.func
-    def advance(sigma: types.stress, history: internal, L: types.tensor, material: Parameters, dt: real):
+    def advance(sigma: types.stress, start: internal, L: types.tensor, material: Parameters, dt: real):
         result = sigma
-        internals = history
+        internals = start
         if wp.static(spins):
             result = transform(result, rotation(L, dt))
         if wp.static(flows):
@@ -109,47 +109,47 @@ def analytic(space: Space, law: Law, spins: bool) -> wp.Function:
 
 @cache
 def rk4(space: Space, law: Law, spins: bool) -> wp.Function:
-    """(σ, history, L, material, Δt) → (σ, history) by RK4, sub-stepped as the stiffness of the flow asks."""
-    types, internal = space.types, history_type(law, space)
+    """(σ, internals, L, material, Δt) → (σ, internals) by RK4, sub-stepped as the stiffness of the flow asks."""
+    types, internal = space.types, internals_type(law, space)
     real, stress, tensor = space.real, types.stress, types.tensor
     spin, Parameters = space.stress.spin, law.Parameters
     flow, flow_stiffness, flows = law.flow, law.flow_stiffness, law.flow is not None
 
     @wp.func
-    def stress_rate(sigma: stress, history: internal, L: tensor, material: Parameters):
+    def stress_rate(sigma: stress, internals: internal, L: tensor, material: Parameters):
         rate = stress()
-        history_rate = internal()
+        internals_rate = internal()
         if wp.static(flows):
-            rate, history_rate = flow(sigma, history, material)
+            rate, internals_rate = flow(sigma, internals, material)
         if wp.static(spins):
             rate += spin(sigma, L)
-        return rate, history_rate
+        return rate, internals_rate
 
     @wp.func
-    def rk4_stress(sigma: stress, history: internal, L: tensor, material: Parameters, dt: real):
+    def rk4_stress(sigma: stress, internals: internal, L: tensor, material: Parameters, dt: real):
         half, sixth = real(0.5) * dt, dt / real(6.0)
-        s1, h1 = stress_rate(sigma, history, L, material)
-        s2, h2 = stress_rate(sigma + half * s1, history + half * h1, L, material)
-        s3, h3 = stress_rate(sigma + half * s2, history + half * h2, L, material)
-        s4, h4 = stress_rate(sigma + dt * s3, history + dt * h3, L, material)
+        s1, h1 = stress_rate(sigma, internals, L, material)
+        s2, h2 = stress_rate(sigma + half * s1, internals + half * h1, L, material)
+        s3, h3 = stress_rate(sigma + half * s2, internals + half * h2, L, material)
+        s4, h4 = stress_rate(sigma + dt * s3, internals + dt * h3, L, material)
         two = real(2.0)
         sigma_new = sigma + sixth * (s1 + two * s2 + two * s3 + s4)
-        history_new = history + sixth * (h1 + two * h2 + two * h3 + h4)
-        return sigma_new, history_new
+        internals_new = internals + sixth * (h1 + two * h2 + two * h3 + h4)
+        return sigma_new, internals_new
 
     @wp.func
-    def substep(sigma: stress, history: internal, material: Parameters, left: real):
+    def substep(sigma: stress, internals: internal, material: Parameters, left: real):
         """The largest equal part of the time left that the stiffness here allows."""
         if wp.static(flows):
-            parts = wp.ceil(flow_stiffness(sigma, history, material) * left / real(STIFFNESS_LIMIT))
+            parts = wp.ceil(flow_stiffness(sigma, internals, material) * left / real(STIFFNESS_LIMIT))
             return left / wp.clamp(parts, real(1.0), real(MOST_SUBSTEPS))
         else:
             return left
 
     @wp.func
-    def advance(sigma: stress, history: internal, L: tensor, material: Parameters, dt: real):
+    def advance(sigma: stress, start: internal, L: tensor, material: Parameters, dt: real):
         result = sigma
-        internals = history
+        internals = start
         left = dt
         while left > real(0.0):
             part = substep(result, internals, material, left)
@@ -171,10 +171,10 @@ def source_kernel(
     accelerates: bool,
 ):
     """The kernel that applies the sources a scene has, and no others."""
-    m, acts_on_stress = len(law.history), advance_stress is not None
+    m, acts_on_stress = len(law.internals), advance_stress is not None
     types, phi = space.types, space.phi
     velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    real, vector, internal = space.real, types.vector, history_type(law, space)
+    real, vector, internal = space.real, types.vector, internals_type(law, space)
     Parameters, MaterialNodes = law.Parameters, types.MaterialNodes
 
     @wp.func
@@ -194,7 +194,7 @@ def source_kernel(
         damping: real,
         dt: wp.array(dtype=real),
         nodes: MaterialNodes,
-        history: wp.array(dtype=internal),
+        internals: wp.array(dtype=internal),
     ):
         i = first + wp.tid()
         half = real(0.5) * dt[0]
@@ -204,12 +204,12 @@ def source_kernel(
         if wp.static(accelerates):
             v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, half)
         if wp.static(acts_on_stress):
-            internals = internal()
+            own = internal()
             if wp.static(m > 0):
-                internals = history[i]
-            sigma, internals = advance_stress(sigma, internals, nodes.velocity_gradient[i], material, half)
+                own = internals[i]
+            sigma, own = advance_stress(sigma, own, nodes.velocity_gradient[i], material, half)
             if wp.static(m > 0):
-                history[i] = internals
+                internals[i] = own
         nodes.point[i].phi = join(v, sigma)
 
     return source_half_step

@@ -52,7 +52,7 @@ def _stress(simulation) -> np.ndarray:
 
 
 def _yield_size(simulation) -> np.ndarray:
-    material, eps = simulation.scene.material, simulation.history.numpy()[:, 0]
+    material, eps = simulation.scene.material, simulation.internals.numpy()[:, 0]
     return np.maximum(
         material.yield_size + material.hardening * eps, material.residual_ratio * material.yield_size
     )
@@ -154,8 +154,8 @@ def fields_of(scene: Scene) -> dict[str, Field]:
 
 def internal_variables(scene: Scene) -> dict[str, Field]:
     """What the nodes of a scene remember of their material, by name."""
-    history = law(scene.material, Space(scene.mesh.continuum, PRECISIONS["float64"])).history
+    variables = law(scene.material, Space(scene.mesh.continuum, PRECISIONS["float64"])).internals
     return {
-        name: Field(unit, "(n,)", meaning, lambda s, k=k: s.history.numpy()[:, k].copy())
-        for k, (name, unit, meaning) in enumerate(history)
+        name: Field(unit, "(n,)", meaning, lambda s, k=k: s.internals.numpy()[:, k].copy())
+        for k, (name, unit, meaning) in enumerate(variables)
     }

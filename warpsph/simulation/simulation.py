@@ -60,7 +60,7 @@ class Simulation:
         shortest_step, longest_step: smallest and largest Δt used so far [s].
         wall_time: seconds spent in steps, without the start.
         threads: number of CPU threads.
-        nodes, auxiliary, history: the arrays on the device.
+        nodes, auxiliary, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
 
     Raises:
@@ -83,7 +83,7 @@ class Simulation:
         self.threads = launcher.threads
         self._stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
         self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
-        self.history, self.conditions = self._stepper.history, self._stepper.conditions
+        self.internals, self.conditions = self._stepper.internals, self._stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
         self._leg: Leg | None = None

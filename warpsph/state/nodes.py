@@ -54,11 +54,11 @@ def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     return ratio * largest
 
 
-def material_history(n: int, law: Law, space: Space, device: wp.Device) -> wp.array | None:
+def material_internals(n: int, law: Law, space: Space, device: wp.Device) -> wp.array | None:
     """The internal variables of the material nodes, zero; None for a law without any."""
-    if not law.history:
+    if not law.internals:
         return None
-    return wp.zeros(n, dtype=space.vec(len(law.history)), device=device)
+    return wp.zeros(n, dtype=space.vec(len(law.internals)), device=device)
 
 
 def auxiliary_nodes(scene: Scene, space: Space, device: wp.Device):

@@ -102,9 +102,9 @@ class CompatibleFluxes:
         put(self._front, (front,))
         put(self._share, (share,))
 
-    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, internals, auxiliary) -> None:
         """Steps 3-6: φ_aux = mean of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        inputs = [material, dt, self._front, pairs, nodes, history, auxiliary, self._cells]
+        inputs = [material, dt, self._front, pairs, nodes, internals, auxiliary, self._cells]
         self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
 
     def to_nodes(self, material, conditions, dt: wp.array, pairs: PairList, auxiliary, nodes) -> None:
@@ -115,7 +115,7 @@ class CompatibleFluxes:
 
 @cache
 def _to_auxiliary_kernel(space: Space, parts: Sweep, ratio: float, law: Law, apart: bool):
-    Parameters, relax, internal = law.Parameters, law.relax, space.vec(max(1, len(law.history)))
+    Parameters, relax, internal = law.Parameters, law.relax, space.vec(max(1, len(law.internals)))
     corners = 2**space.dim
     types, cells_types = space.types, cell_types(space, apart)
     real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
@@ -138,7 +138,7 @@ def _to_auxiliary_kernel(space: Space, parts: Sweep, ratio: float, law: Law, apa
         front: wp.array(dtype=real),
         pairs: PairList,
         nodes: MaterialNodes,
-        history: wp.array(dtype=internal),
+        internals: wp.array(dtype=internal),
         auxiliary: AuxiliaryNodes,
         cells: Cells,
     ):
@@ -157,7 +157,7 @@ def _to_auxiliary_kernel(space: Space, parts: Sweep, ratio: float, law: Law, apa
         if wp.static(relax is not None):
             mean, smooth = internal(), tensor()
             for k in range(wp.static(corners)):
-                mean += history[auxiliary.cell[a, k]] / real(corners)
+                mean += internals[auxiliary.cell[a, k]] / real(corners)
                 smooth += nodes.velocity_gradient[auxiliary.cell[a, k]] / real(corners)
             rough = velocity_gradient(cell.gradient) - smooth
             elastic = real(0.5) * dt * elastic_rate(rough, material.lame, material.shear, material.young)

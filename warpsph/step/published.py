@@ -48,7 +48,7 @@ class PublishedFluxes:
     def set_courant(self, courant: float) -> None:
         """Nothing: the published schemes know the time step only."""
 
-    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, history, auxiliary) -> None:
+    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, internals, auxiliary) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         inputs = [material, dt, pairs, nodes, auxiliary]
         self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)

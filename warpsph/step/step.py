@@ -18,7 +18,7 @@ from ..scene.scene import Scene
 from ..state.clock import Clock, Outcome
 from ..state.nodes import (
     auxiliary_nodes,
-    material_history,
+    material_internals,
     material_nodes,
 )
 from ..state.pairs import SKIN, Neighbours
@@ -36,7 +36,7 @@ class Stepper:
     Attributes:
         nodes: material nodes (struct of arrays, see `warpsph.state.nodes`).
         auxiliary: auxiliary nodes.
-        history: internal variables of the material, or None.
+        internals: internal variables of the material, or None.
         conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
         clock: what differs from step to step.
         shrinkage: least time of a wave from node to node over the initial one, at most 1, as of the last list.
@@ -50,7 +50,7 @@ class Stepper:
         self._parameters = law.fill(scene.material)
         self.nodes = material_nodes(scene, space, device)
         self.auxiliary = auxiliary_nodes(scene, space, device)
-        self.history = material_history(n, law, space, device)
+        self.internals = material_internals(n, law, space, device)
         functions = scene.boundary.functions
         self.clock = Clock(scene.body_force, functions, space, launcher)
         self._launcher, self._recording, self._recorded = launcher, None, None
@@ -107,11 +107,11 @@ class Stepper:
     def step(self) -> None:
         """Advance the nodes by the clock's Δt; the numbers are those of METHOD section 3."""
         dt = self.clock.time_step
-        self._sources.half_step(self.nodes, self.history, self.clock.first_half, dt)  # 1-2
+        self._sources.half_step(self.nodes, self.internals, self.clock.first_half, dt)  # 1-2
         self.conditions.turn(self.nodes, dt)
         self.to_auxiliary()  # 3-6
         self.to_nodes()  # 7-10
-        self._sources.half_step(self.nodes, self.history, self.clock.second_half, dt)  # 11-12
+        self._sources.half_step(self.nodes, self.internals, self.clock.second_half, dt)  # 11-12
         self.conditions.turn(self.nodes, dt)
         self.conditions.apply(self.nodes)  # 13
         self._motion.move(self.nodes, self.auxiliary, dt)  # 14
@@ -120,7 +120,7 @@ class Stepper:
     def to_auxiliary(self) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
         dt, pairs = self.clock.time_step, self._around_auxiliary.pairs
-        self._fluxes.to_auxiliary(self._parameters, dt, pairs, self.nodes, self.history, self.auxiliary)
+        self._fluxes.to_auxiliary(self._parameters, dt, pairs, self.nodes, self.internals, self.auxiliary)
 
     def to_nodes(self) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
