@@ -6,11 +6,12 @@ from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotat
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .material import Elastic, PerzynaVonMises
-from .numerics import KERNELS, PUBLISHED, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .numerics import KERNELS, PUBLISHED, SOURCE_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
 from .parameter import Parameter
 from .resolve import BoundaryTable
 from .scene import BodyForce, Scene
+from .scheme import SCHEMES, Scheme
 from .selection import edge, everywhere, region, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
 
@@ -20,9 +21,9 @@ __all__ = [
     "KERNELS",
     "PLANE_STRAIN",
     "PUBLISHED",
+    "SCHEMES",
     "SOLID",
     "SOURCE_SCHEMES",
-    "VELOCITY_SCHEMES",
     "BodyForce",
     "BoundaryTable",
     "Box",
@@ -50,6 +51,7 @@ __all__ = [
     "Roller",
     "Rotating",
     "Scene",
+    "Scheme",
     "Shape",
     "Table",
     "edge",

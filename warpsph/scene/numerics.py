@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..errors import SceneError
 from ..mesh.continuum import Continuum
 from ..validate import choice, number
+from .scheme import Scheme, scheme_of
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,9 @@ KERNELS = {
     "cubic_spline": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
     "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
 }
-VELOCITY_SCHEMES = ("compatible", "blanc-pastor", "taylor")
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
-LARGEST_SUPPORT = 6.0
-# With `compatible`, but in a bar: from the third ring of auxiliary nodes on (√6.5 Δx) gradients at nodes and cells
-# are no longer each other's transpose at an edge, and waves there grow.
-LARGEST_COMPATIBLE_SUPPORT = 2.55
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +44,8 @@ class Numerics:
             `compatible` keep the support below 2.12 Δx, and it must be at most 2.55 Δx: see
             docs/velocity_steps.md, "What still fails".
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
-        velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the
-            published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
+        velocity_scheme: the name of a scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md),
+            `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
     """
@@ -63,7 +59,7 @@ class Numerics:
 
     def __post_init__(self):
         choice("kernel", self.kernel, KERNELS)
-        choice("velocity_scheme", self.velocity_scheme, VELOCITY_SCHEMES)
+        scheme_of(self.velocity_scheme)
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
         ratio = KERNELS[self.kernel].smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
         object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
@@ -72,14 +68,9 @@ class Numerics:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
 
     @property
-    def unloads(self) -> bool:
-        """Whether free edges lose their tractions by elastic unloading, not by cutting them off."""
-        return self.velocity_scheme == "compatible"
-
-    @property
-    def follows_cells(self) -> bool:
-        """Whether kernels are stretched and turned with the cells, and so reach a stretched cell's corners."""
-        return self.velocity_scheme == "compatible"
+    def scheme(self) -> Scheme:
+        """The scheme that `velocity_scheme` names."""
+        return scheme_of(self.velocity_scheme)
 
     @property
     def support(self) -> float:
@@ -95,8 +86,7 @@ class Numerics:
         """
         support = KERNELS[self.kernel].support
         least = continuum.smallest_support * stretch / support
-        compatible = self.velocity_scheme == "compatible" and continuum.dim > 1
-        most = (LARGEST_COMPATIBLE_SUPPORT if compatible else LARGEST_SUPPORT) / support
+        most = self.scheme.largest_support(continuum.dim) / support
         if not least < self.smoothing_ratio <= most:
             reach = continuum.smallest_support * stretch
             raise SceneError(

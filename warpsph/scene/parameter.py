@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
 from ..validate import instance, number
-from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .numerics import KERNELS, SOURCE_SCHEMES, Numerics
+from .scheme import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...
         "velocity_scheme": (
             Numerics.velocity_scheme,
             "-",
-            f"velocity step: {', '.join(VELOCITY_SCHEMES)}",
-            VELOCITY_SCHEMES,
+            f"velocity step: {', '.join(SCHEMES)}",
+            tuple(SCHEMES),
         ),
         "source_scheme": (
             Numerics.source_scheme,

@@ -125,8 +125,9 @@ class Scene:
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
         if self.free_surface is not None:
             self._check_free_surface()
-        stretch = self.mesh.largest_edge() / self.mesh.spacing
-        self.numerics.check_support(self.mesh.continuum, 1.0 if self.numerics.follows_cells else stretch)
+        scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
+        scheme.check_cells(self.mesh)
+        self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
         _ = self.boundary, self.initial_velocity, self.initial_stress
 
     def _check_free_surface(self) -> None:
@@ -149,7 +150,7 @@ class Scene:
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
-        if not self.numerics.unloads:
+        if not self.numerics.scheme.unloads:
             return resolve(self.mesh, self.conditions)
         conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
         if self.free_surface is None and bare.faces(self.mesh).any():
