@@ -32,7 +32,7 @@ def simulation_of(dim, device, precision, cells=4, mapped=jitter, **numerics):
 
 def move(simulation, dt):
     """Step 14 alone."""
-    stepper = simulation._stepper
+    stepper = simulation.stepper
     stepper.clock.begin([0.0], dt)
     stepper._motion.move(simulation.nodes, simulation.auxiliary, stepper.clock.time_step)
 
@@ -109,7 +109,7 @@ def edges_of(simulation):
 
 def missed_neighbours(simulation):
     """How many nodes, and cells, within a stretched support the pair lists do not hold."""
-    mesh, numerics, stepper = simulation.mesh, simulation.scene.numerics, simulation._stepper
+    mesh, numerics, stepper = simulation.mesh, simulation.scene.numerics, simulation.stepper
     reach = 0.999 * KERNELS[numerics.kernel].support * numerics.smoothing_ratio
     frames = np.linalg.inv(edges_of(simulation))
     of_nodes = [frames[(mesh.cells == i).any(axis=1)].mean(axis=0) for i in range(len(mesh.nodes))]
@@ -131,7 +131,7 @@ def missed_neighbours(simulation):
 def test_lists_hold_all_of_the_stretched_supports(device, dim, name):
     """The supports are ellipses, the lists are made for circles."""
     simulation = moved(simulation_of(dim, device, "float64"), MOTIONS[name](dim))
-    simulation._stepper._build_lists()
+    simulation.stepper._build_lists()
     assert missed_neighbours(simulation) == 0
 
 
@@ -166,7 +166,7 @@ def test_a_folded_cell_keeps_a_tenth_of_its_volume(device, precision):
 
 
 def shrinkage_after(simulation, F):
-    stepper = moved(simulation, F)._stepper
+    stepper = moved(simulation, F).stepper
     stepper._build_lists()
     return stepper.shrinkage
 
@@ -194,7 +194,7 @@ def test_spacing_is_the_least_singular_value_of_the_edges_times_the_root_of_the_
     """Of every cell of a distorted lattice; the power method may be 0.3 % above, and never below."""
     simulation = simulation_of(dim, "cpu", precision)
     shrinkage_after(simulation, MOTIONS[name](dim))
-    spacing = 1.0 / simulation._stepper._motion._spacing._rate.numpy()
+    spacing = 1.0 / simulation.stepper._motion._spacing._rate.numpy()
     edges = edges_of(simulation)
     density = SOFT.density * simulation.mesh.cell_volumes() / np.abs(np.linalg.det(edges))
     error = spacing / (np.linalg.svd(edges, compute_uv=False).min(axis=1) * np.sqrt(density)) - 1.0
@@ -222,5 +222,5 @@ def test_a_folded_cell_does_not_shorten_the_step(precision):
     velocity[corner] = (0.6, 0.6)
     simulation.nodes.half_velocity.assign(velocity)
     move(simulation, 1.0)
-    simulation._stepper._build_lists()
-    assert simulation._stepper.shrinkage == pytest.approx(1.0, rel=ROUNDING[precision])
+    simulation.stepper._build_lists()
+    assert simulation.stepper.shrinkage == pytest.approx(1.0, rel=ROUNDING[precision])

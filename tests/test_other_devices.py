@@ -60,7 +60,7 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
     first.run(0.05)
     restored.restore(*first.state())
     told_of = ("nodes.", "auxiliary.", "_around", "_motion._of_node", "_fluxes._cells")
-    every = (slot for slot in slots(restored._stepper) if isinstance(slot.value, wp.array))
+    every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}
     assert len(arrays) > 20
     for path, array in arrays.items():

@@ -59,7 +59,7 @@ def test_pair_lists_hold_every_neighbour_once(device, precision, shape):
     for _ in range(12):
         simulation.step()
     assert simulation.list_builds > 1
-    stepper = simulation._stepper
+    stepper = simulation.stepper
     for around, targets, sources in (
         (stepper._around_nodes, stepper.nodes, stepper.auxiliary),
         (stepper._around_auxiliary, stepper.auxiliary, stepper.nodes),

@@ -94,7 +94,7 @@ def pairs(neighbours) -> int:
 
 def bytes_per_node_step(simulation: Simulation, phases) -> dict[str, float]:
     """Bytes moved a material node and step, by phase, for those phases that the scene has."""
-    stepper, n = simulation._stepper, len(simulation.mesh.nodes)
+    stepper, n = simulation.stepper, len(simulation.mesh.nodes)
     return {
         phase: times * sum(_size(stepper, name) for name in (*read, *written)) / n
         for phase, (times, read, written) in TRAFFIC.items()
@@ -120,7 +120,7 @@ def flops_per_node_step(simulation: Simulation) -> float:
     With p unknowns in d dimensions a pair costs 5d + 4 + 3p + 2pd + 2d² (`warpsph.operators.neighbour_sums`), a
     target's value and gradient 4p + 2pd + 2pd² beside the small inverse. Sources and motion are not counted.
     """
-    stepper, continuum = simulation._stepper, simulation.mesh.continuum
+    stepper, continuum = simulation.stepper, simulation.mesh.continuum
     d, p = continuum.dim, continuum.dim + continuum.stress_size
     entries = pairs(stepper._around_auxiliary) + pairs(stepper._around_nodes)
     n, m = len(simulation.mesh.nodes), len(simulation.mesh.cells)
@@ -132,7 +132,7 @@ def flops_per_node_step(simulation: Simulation) -> float:
 def memory_per_node(simulation: Simulation) -> float:
     """Bytes of all Warp arrays of the simulation a material node; what a hash grid holds inside is not seen."""
     found: dict[int, int] = {}
-    _collect_arrays(simulation._stepper, found, set())
+    _collect_arrays(simulation.stepper, found, set())
     return sum(found.values()) / len(simulation.mesh.nodes)
 
 

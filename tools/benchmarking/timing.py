@@ -79,7 +79,7 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
     The step is not recorded here, and the device is waited for after every phase, so the sum is more than the same
     steps take otherwise.
     """
-    stepper, spent = simulation._stepper, defaultdict(float)
+    stepper, spent = simulation.stepper, defaultdict(float)
     wrapped = []
     for phase, (part, method) in PHASES.items():
         owner = stepper if part is None else getattr(stepper, part)
@@ -103,11 +103,11 @@ class _Plain:
     """Steps made launch by launch."""
 
     def __init__(self, stepper):
-        self._stepper = stepper
+        self.stepper = stepper
 
     def run(self) -> None:
-        while self._stepper.clock.going.numpy()[0]:
-            self._stepper.step()
+        while self.stepper.clock.going.numpy()[0]:
+            self.stepper.step()
 
 
 def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):

@@ -62,6 +62,7 @@ class Simulation:
         threads: number of CPU threads.
         nodes, auxiliary, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
+        stepper: makes the steps; for developers, its parts may change from version to version.
 
     Raises:
         SceneError: the device, the precision or the time step is not allowed.
@@ -81,9 +82,9 @@ class Simulation:
         self._initial_limit = time_step_limit(scene)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        self._stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
-        self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
-        self.internals, self.conditions = self._stepper.internals, self._stepper.conditions
+        self.stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
+        self.nodes, self.auxiliary = self.stepper.nodes, self.stepper.auxiliary
+        self.internals, self.conditions = self.stepper.internals, self.stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
         self._leg: Leg | None = None
@@ -91,7 +92,7 @@ class Simulation:
     @property
     def time_step_limit(self) -> float:
         """Largest Δt the scene now allows [s]: less than at the start where nodes are closer, or waves faster."""
-        return self._initial_limit * self._stepper.shrinkage
+        return self._initial_limit * self.stepper.shrinkage
 
     def step(self, time_step: float | None = None) -> None:
         """Advance by one time step.
@@ -149,7 +150,7 @@ class Simulation:
 
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        outcome = self._stepper.advance(times, dt)
+        outcome = self.stepper.advance(times, dt)
         self.steps += outcome.made
         self.time = times[outcome.made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)
@@ -167,7 +168,7 @@ class Simulation:
         """All that the next steps depend on: arrays and numbers by name; see `restore`."""
         own = {name: getattr(self, name) for name in COUNTERS}
         leg = None if self._leg is None else asdict(self._leg)
-        return arrays(self._stepper), {**own, "leg": leg, "stepper": numbers(self._stepper)}
+        return arrays(self.stepper), {**own, "leg": leg, "stepper": numbers(self.stepper)}
 
     def restore(self, state: Mapping[str, np.ndarray], values: Mapping[str, object]) -> None:
         """Go back to what `state` gave, in this simulation or in another one of the same scene and precision.
@@ -175,7 +176,7 @@ class Simulation:
         Raises:
             KeyError: the state is of another scene.
         """
-        restore(self._stepper, state, values["stepper"])
+        restore(self.stepper, state, values["stepper"])
         for name in COUNTERS:
             setattr(self, name, values[name])
         self._leg = None if values["leg"] is None else Leg(**values["leg"])
@@ -205,4 +206,4 @@ class Simulation:
     @property
     def list_builds(self) -> int:
         """How often the pair lists were built."""
-        return self._stepper.list_builds
+        return self.stepper.list_builds
