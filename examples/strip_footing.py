@@ -25,12 +25,11 @@ from warpsph import (
     PrescribedVelocity,
     Probe,
     Roller,
-    Sampler,
     Scene,
     edge,
-    trace_ridge,
     where,
 )
+from warpsph.analysis import Sampler, trace_ridge
 
 HALF_WIDTH = 1.0  # of the footing [m]
 SIZE = (7.0, 3.0)
@@ -101,7 +100,8 @@ def scene(p):
 
 def second_band(mesh, strain):
     """The curved band: where ε̄ (n,) is largest on each ray from the footing's edge, in initial positions."""
-    return trace_ridge(Sampler(mesh.nodes, mesh.cells, strain), EDGE, RAYS, NEAREST, FARTHEST, SMOOTHING)
+    strain_at = Sampler(mesh, strain)
+    return trace_ridge(strain_at, EDGE, angles=RAYS, nearest=NEAREST, farthest=FARTHEST, smoothing=SMOOTHING)
 
 
 def checks(run):

@@ -28,9 +28,9 @@ from warpsph import (
     Roller,
     Scene,
     edge,
-    fit_band,
     where,
 )
+from warpsph.analysis import fit_band
 
 SIZE = (10.0, 10.0)
 WIDTH = 5.0  # of the footing [m]

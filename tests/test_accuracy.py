@@ -19,9 +19,9 @@ from warpsph import (
     Roller,
     Scene,
     Simulation,
-    checkerboard_amplitude,
     edge,
 )
+from warpsph.analysis import checkerboard_amplitude
 
 from .motions import (
     CANTILEVER_PERIOD,

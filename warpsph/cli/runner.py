@@ -12,8 +12,9 @@ from typing import Protocol
 
 from .. import __version__
 from ..errors import NonFiniteError, SceneError, StoppedError
-from ..export.plots import plot_field, plot_history
-from ..export.surface_plot import plot_surface
+from ..export.pictures.field import plot_field
+from ..export.pictures.history import plot_history
+from ..export.pictures.surface import plot_surface
 from ..scene.check import Check
 from ..scene.output import component
 from ..scene.scene import Scene

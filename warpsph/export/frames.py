@@ -20,9 +20,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from ..analysis import green_strain, mean_stress, von_mises
 from ..errors import SceneError, one_of
 from ..mesh.mesh import Mesh
-from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
+from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
 from ..storage.files import whole

@@ -1,4 +1,4 @@
-"""What a case of the report is made of: the runs it needs, and what it tells about them."""
+"""What a case of the report is made of: the runs it needs, and its section of the page."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A further table: its caption, its header, and its lines (numbers or texts), the first column naming them."""
 
     caption: str
@@ -72,7 +72,7 @@ class Section:
     rows: Sequence[Row]
     pictures: Sequence[Picture]
     results: Sequence[Result]
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,10 @@ class Case:
     Attributes:
         name: of its pictures.
         runs: what it needs.
-        tell: its section, from its results (by the runs' names) and a function that gives the path of a picture.
+        section: makes its section from its results (by the runs' names) and a function that gives the path of a
+            picture.
     """
 
     name: str
     runs: tuple[Run, ...]
-    tell: Callable[[Mapping[str, Result], Callable[[str], Path]], Section]
+    section: Callable[[Mapping[str, Result], Callable[[str], Path]], Section]

@@ -1,4 +1,4 @@
-"""The report from end to end: what is missing is run, then everything is told."""
+"""The report from end to end: what is missing is run, then all is laid out."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def make_report(folder: Path, *, quick: bool, device: str | None, jobs: int, qui
     for case in chosen:
         found = {run.name: run.read(folder / "runs" / run.name) for run in case.runs}
         results += found.values()
-        sections.append(case.tell(found, lambda name, case=case: figures / f"{case.name}_{name}.png"))
+        sections.append(case.section(found, lambda name, case=case: figures / f"{case.name}_{name}.png"))
     seconds = sum(result.seconds for result in results)
     lead = [
         "T. Blanc, M. Pastor, A stabilized Runge-Kutta, Taylor smoothed particle hydrodynamics algorithm for "

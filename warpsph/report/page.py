@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from .case import Row, Section, Table
+from .case import ReportTable, Row, Section
 
 HEADER = ("quantity", "unit", "paper", "exact", "ours", "difference", "run time")
 CHECKS = ("run", "check", "value", "reference", "unit", "error", "bound", "")
@@ -106,7 +106,7 @@ def shown(value: float | str | None) -> str:
     return f"{value:.5g}" if abs(value) >= 1e3 else f"{value:.4g}"
 
 
-def _texts(table: Table) -> list[tuple[str, ...]]:
+def _texts(table: ReportTable) -> list[tuple[str, ...]]:
     return [tuple(shown(value) for value in line) for line in table.lines]
 
 

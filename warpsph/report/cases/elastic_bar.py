@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case import Case, Picture, Row, Section
-from ..drawing import BRIGHT, DARK, GREY, Curve, diagram, new_figure, save
+from ..drawing import BRIGHT, DARK, GREY, Curve, diagram, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -15,7 +15,7 @@ BAR = Run("elastic_bar", "elastic_bar", (), tuple(np.round(np.arange(0.0, 0.0301
 
 def case(quick: bool) -> Case:
     """One run of a second; the same in the quick form."""
-    return Case("elastic_bar", (BAR,), tell)
+    return Case("elastic_bar", (BAR,), section)
 
 
 def dalembert(x, t, length, speed, velocity, impedance):
@@ -36,7 +36,7 @@ def dalembert(x, t, length, speed, velocity, impedance):
     return v, stress, u
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figures 8 to 11 and the plateaus."""
     bar = results[BAR.name]
     p, module, history = bar.parameters, bar.file.module, bar.history
@@ -81,7 +81,7 @@ def tell(results, picture) -> Section:
 
 
 def _figure11(bar, path):
-    figure, axes = new_figure(1, 1, (7.5, 5.0))
+    figure, axes = grid(1, 1, (7.5, 5.0))
     at, X = axes[0, 0], bar.mesh.nodes[:, 0]
     time, u = 1e3 * bar.times, np.array([frame.field("displacement")[:, 0] for frame in bar.frames])
     drawn = X + MAGNIFIED * u
@@ -96,4 +96,4 @@ def _figure11(bar, path):
     at.axvline(1.0, color=GREY, linewidth=0.8)
     at.set_xlabel("x + 20 u [m]")
     at.set_ylabel("time [ms]")
-    return save(figure, path)
+    return save_picture(figure, path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case import Case, Picture, Row, Section
-from ..drawing import Curve, Panel, diagram, fields
+from ..drawing import Curve, Panel, diagram, draw_fields
 from ..prose import prose
 from ..runs import Run
 
@@ -16,13 +16,13 @@ MAGNIFIED = 200.0  # displacements in the figure, as in the paper
 
 def case(quick: bool) -> Case:
     """Both schemes; the same in the quick form."""
-    return Case("hanging_bar", (COMPLETE, PUBLISHED), tell)
+    return Case("hanging_bar", (COMPLETE, PUBLISHED), section)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figure 6, the checkerboard in time, and the amplitude left."""
     both = [(label, results[run.name]) for label, run in (("complete", COMPLETE), ("published", PUBLISHED))]
-    figure6 = fields(
+    figure6 = draw_fields(
         picture("6"),
         [[_panel(f"{label} scheme", result) for label, result in both]],
         "vertical velocity [m/s]",
@@ -56,5 +56,4 @@ def tell(results, picture) -> Section:
 
 
 def _panel(title, result) -> Panel:
-    position = result.mesh.nodes + MAGNIFIED * result.at("displacement")
-    return Panel(title, position, np.ascontiguousarray(result.at("velocity")[:, 1]), result.mesh)
+    return Panel(title, result.moved(magnified=MAGNIFIED), np.ascontiguousarray(result.at("velocity")[:, 1]))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..case import Case, Picture, Row, Section, Table
-from ..drawing import BRIGHT, Curve, Panel, diagram, draw_cells, new_figure, save
-from ..drawing import fields as draw_fields
+from ..case import Case, Picture, ReportTable, Row, Section
+from ..drawing import BRIGHT, Curve, Panel, diagram, draw_cells, draw_fields, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -23,10 +22,10 @@ def case(quick: bool) -> Case:
         runs.append(Run(f"{SCENE}_{spacing}", SCENE, (f"spacing={spacing}",)))
     if not quick:
         runs.append(Run(f"{SCENE}_slow", SCENE, SLOW))
-    return Case(SCENE, tuple(runs), tell)
+    return Case(SCENE, tuple(runs), section)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figures 22 to 24, the traced bands, and the limit load against the spacing."""
     perfect, soft = results[SCENE], results[f"{SCENE}_soft"]
     others = [result for result in results.values() if result not in (perfect, soft)]
@@ -73,7 +72,7 @@ def tell(results, picture) -> Section:
                 0.06,
             ),
         ]
-    bands = Table(
+    bands = ReportTable(
         "The second band, traced from the axis to the surface (strain averaged over 0.3 m along a ray):",
         ("", "least strain", "median strain", "deepest point [m]", "comes out at x [m]"),
         [
@@ -87,7 +86,7 @@ def tell(results, picture) -> Section:
             for kind, ridge in zip(("H = 0", "softening"), ridges, strict=True)
         ],
     )
-    loads = Table(
+    loads = ReportTable(
         "The limit load at other spacings and rates (Δx = 0.1 m and 3e-3 m/s² unless said):",
         ("", "mean load [N]", "to exact", "run time [s]"),
         [
@@ -138,7 +137,7 @@ def _figure22(perfect, soft, exact, path):
 def _figure23(perfect, soft, path):
     rows = [
         [
-            Panel(f"{kind}, t = {time:g} s", result.at("position", k), result.at(STRAIN, k), result.mesh)
+            Panel(f"{kind}, t = {time:g} s", result.moved(k), result.at(STRAIN, k))
             for kind, result in (("H = 0", perfect), ("softening", soft))
         ]
         for k, time in enumerate(TIMES)
@@ -151,9 +150,8 @@ def _figure24(perfect, soft, path):
         [
             Panel(
                 f"{kind}, t = {TIMES[k]:g} s",
-                result.mesh.nodes + 2.0 * result.at("displacement", k),
+                result.moved(k, magnified=2.0),
                 1e3 * np.linalg.norm(result.at("displacement", k), axis=1),
-                result.mesh,
             )
             for kind, result in (("H = 0", perfect), ("softening", soft))
         ]
@@ -163,11 +161,10 @@ def _figure24(perfect, soft, path):
 
 
 def _traces(pair, ridges, path):
-    figure, axes = new_figure(2, 1, (9.0, 8.0))
+    figure, axes = grid(2, 1, (9.0, 8.0))
     for at, result, ridge, kind in zip(axes[:, 0], pair, ridges, ("H = 0", "softening"), strict=True):
-        strain, nodes = result.at(STRAIN), result.mesh.nodes
         span = (0.0, 3.0 * float(np.median(ridge.strain)))
-        colours = draw_cells(at, nodes, strain, result.mesh, span)
+        colours = draw_cells(at, result.mesh, result.at(STRAIN), span=span)
         at.plot(
             *ridge.points.T,
             "o",
@@ -180,4 +177,4 @@ def _traces(pair, ridges, path):
             f"{kind}: least strain {ridge.strain.min():.2g}, median {np.median(ridge.strain):.2g}", fontsize=10
         )
         figure.colorbar(colours, ax=at, label="ε̄ [-]", extend="max", shrink=0.8)
-    return save(figure, path)
+    return save_picture(figure, path)

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ...analysis.measures import Sampler, band_profile, width_at_half
-from ..case import Case, Picture, Row, Section, Table
-from ..drawing import BRIGHT, DARK, Curve, Panel, diagram, draw_curves, fields, new_figure, save
+from ...analysis import Sampler, band_profile, width_at_half
+from ..case import Case, Picture, ReportTable, Row, Section
+from ..drawing import BRIGHT, DARK, Curve, Panel, diagram, draw_curves, draw_fields, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -32,7 +32,7 @@ def case(quick: bool) -> Case:
             _run(spacing, (f"spacing={spacing}", *far)),
             _run(f"soft_{spacing}", (f"spacing={spacing}", SOFTENING, *far)),
         ]
-    return Case(SCENE, tuple(runs), tell)
+    return Case(SCENE, tuple(runs), section)
 
 
 def _run(name, settings) -> Run:
@@ -41,7 +41,7 @@ def _run(name, settings) -> Run:
     return Run("_".join(filter(None, (SCENE, name))), SCENE, settings, times)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figures 17 to 19, the fitted bands, and the band width against the spacing."""
     perfect, soft = results[SCENE], results[f"{SCENE}_soft"]
     slow = results[SLOW]
@@ -124,7 +124,7 @@ def _formed(result):
     return settlement[inside], load[inside]
 
 
-def _loads(results, perfect, finer, exact) -> Table:
+def _loads(results, perfect, finer, exact) -> ReportTable:
     """The limit load at other spacings, a smaller step, and slower loading."""
     slow = results[SLOW]
     varied = [("as above", perfect)]
@@ -133,16 +133,16 @@ def _loads(results, perfect, finer, exact) -> Table:
         ("Courant 0.5", results[f"{SCENE}_step"]),
         (f"footing pressed with {slow.parameters.acceleration:g} m/s²", slow),
     ]
-    return Table(
+    return ReportTable(
         "What the limit load depends on (Δx = 0.5 m, Courant number 1 and 3e-5 m/s² unless said):",
         ("", "mean load [N]", "to exact", "load at 0.15 m [N]", "to exact", "run time [s]"),
         [_load_line(name, result, exact) for name, result in varied],
     )
 
 
-def _width_table(widths) -> Table:
+def _width_table(widths) -> ReportTable:
     """Band widths against the spacing."""
-    return Table(
+    return ReportTable(
         f"Width of the band at half its height, at {WIDTH_AT} m of settlement:",
         ("Δx [m]", "H = 0 [m]", "softening [m]", "H = 0 [Δx]", "softening [Δx]"),
         [(f"{dx:g}", *both, *(width / dx for width in both)) for dx, both in widths.items()],
@@ -199,33 +199,31 @@ def _evolution(perfect, soft, path):
         [
             Panel(
                 f"{_kind(result)}, settlement {settlement:g} m",
-                result.at("position", k),
+                result.moved(k),
                 result.at("equivalent_plastic_strain", k),
-                result.mesh,
             )
             for result in (perfect, soft)
         ]
         for k, settlement in enumerate(SETTLEMENTS)
         if k > 0
     ]
-    return fields(path, rows, "equivalent viscoplastic strain [-]", (8.5, 10.5), edges=False)
+    return draw_fields(path, rows, "equivalent viscoplastic strain [-]", (8.5, 10.5), edges=False)
 
 
 def _figure19(perfect, soft, path):
     row = [
         Panel(
             _kind(result),
-            result.mesh.nodes + 2.0 * result.at("displacement"),
+            result.moved(magnified=2.0),
             np.linalg.norm(result.at("displacement"), axis=1),
-            result.mesh,
         )
         for result in (perfect, soft)
     ]
-    return fields(path, [row], "displacement [m]", (10.5, 5.0))
+    return draw_fields(path, [row], "displacement [m]", (10.5, 5.0))
 
 
 def _bands(pair, path):
-    figure, axes = new_figure(1, len(pair), (10.5, 5.2), sharey=True)
+    figure, axes = grid(1, len(pair), (10.5, 5.2), sharey=True)
     for at, result in zip(axes[0], pair, strict=True):
         strain, nodes = result.at("equivalent_plastic_strain"), result.mesh.nodes
         band = result.file.module.band(result.mesh, strain)
@@ -235,22 +233,22 @@ def _bands(pair, path):
         at.set_title(f"{_kind(result)}: {abs(band.angle):.1f}°", fontsize=10)
         at.set(aspect="equal", xlim=(2.5, 10.3), ylim=(2.5, 10.3), xlabel="X [m]", ylabel="Y [m]")
         at.label_outer()
-    return save(figure, path)
+    return save_picture(figure, path)
 
 
 def _widths(found, path):
     """The picture of the profiles across the bands, and spacing → widths [m] without and with softening."""
-    figure, axes = new_figure(1, 2, (10.5, 4.0), sharey=True)
+    figure, axes = grid(1, 2, (10.5, 4.0), sharey=True)
     widths, curves = {}, {"perfectly viscoplastic": [], "softening": []}
     for result in sorted(found, key=lambda result: -result.parameters.spacing):
         strain = result.at("equivalent_plastic_strain", SETTLEMENTS.index(WIDTH_AT))
         band = result.file.module.band(result.mesh, strain)
-        sample = Sampler(result.mesh.nodes, result.mesh.cells, strain)
-        across, profile = band_profile(sample, band, REACH)
+        sample = Sampler(result.mesh, strain)
+        across, profile = band_profile(sample, band, reach=REACH)
         widths.setdefault(result.parameters.spacing, []).append(width_at_half(across, profile))
         curves[_kind(result)].append(Curve(f"Δx = {result.parameters.spacing:g} m", across, profile))
     for at, (kind, lines) in zip(axes[0], curves.items(), strict=True):
         draw_curves(at, lines, "distance from the band's axis [m]", "equivalent viscoplastic strain [-]")
         at.set_title(kind, fontsize=10)
         at.label_outer()
-    return save(figure, path), widths
+    return save_picture(figure, path), widths
