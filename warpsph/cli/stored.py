@@ -128,9 +128,9 @@ class StoredScene:
         """The checks of a finished run, if there is a scene file."""
         return self.source.checks(run) if self.source else []
 
-    def blamed(self) -> contextlib.AbstractContextManager:
+    def errors_located(self) -> contextlib.AbstractContextManager:
         """Turns what the scene file's functions raise into a `SceneError`."""
-        return self.source.blamed() if self.source else contextlib.nullcontext()
+        return self.source.errors_located() if self.source else contextlib.nullcontext()
 
 
 def open_scene(name: str) -> SceneFile | StoredScene:
