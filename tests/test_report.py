@@ -89,7 +89,7 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
     assert "non-finite" in result.summary["error"]
     assert len(result.times) == 2, "the frame at 10 ms was never reached"
     section = Section(Prose("t", "x", ()), [Row("q", 1.0)], [], [result])
-    write_markdown(tmp_path / "r.md", "title", [], [section])
+    write_markdown(tmp_path / "r.md", [section], title="title", lead=[])
     assert "broke down" in (tmp_path / "r.md").read_text()
 
 
@@ -186,11 +186,17 @@ class Elements(HTMLParser):
 @pytest.fixture
 def section(tmp_path):
     path = diagram(
-        tmp_path / "a.png", [Curve("a < b", [0, 1], [0, 1]), Curve("exact", [0, 1], [1, 1], exact=True)], "x", "y"
+        tmp_path / "a.png",
+        [Curve("a < b", [0, 1], [0, 1]), Curve("exact", [0, 1], [1, 1], exact=True)],
+        x_label="x",
+        y_label="y",
     )
     return Section(
         prose=Prose("Title & more", "Text with `code`.", ("**First** <difference>.", "Second.")),
-        rows=[Row("load | sum", 91473.7, "N", 90650.0, 89055.0, 6.23), Row("words", "broke down")],
+        rows=[
+            Row("load | sum", 91473.7, unit="N", paper=90650.0, exact=89055.0, seconds=6.23),
+            Row("words", "broke down"),
+        ],
         pictures=[Picture(path, 'A "caption"')],
         results=[],
         tables=[ReportTable("Three:", ("", "a", "b"), [("line", 1.0, None)])],
@@ -198,7 +204,7 @@ def section(tmp_path):
 
 
 def test_html_page_stands_alone(section, tmp_path):
-    write_html(tmp_path / "r.html", "Report", ["Lead."], [section])
+    write_html(tmp_path / "r.html", [section], title="Report", lead=["Lead."])
     elements = Elements()
     elements.feed((tmp_path / "r.html").read_text(encoding="utf-8"))
     assert elements.open == []
@@ -210,7 +216,7 @@ def test_html_page_stands_alone(section, tmp_path):
 
 
 def test_markdown_refers_to_its_pictures_and_keeps_its_tables(section, tmp_path):
-    write_markdown(tmp_path / "r.md", "Report", ["Lead."], [section])
+    write_markdown(tmp_path / "r.md", [section], title="Report", lead=["Lead."])
     lines = (tmp_path / "r.md").read_text(encoding="utf-8").splitlines()
     assert '![A "caption"](a.png)' in lines
     (row,) = (line for line in lines if line.startswith("| load"))

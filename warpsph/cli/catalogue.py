@@ -123,10 +123,10 @@ def load(name: str) -> SceneFile:
     path = scenes.get(name, Path(name).absolute())
     if not path.is_file():
         raise SceneError("scene", name, f"{one_of(scenes, name)}, or the path of a scene file")
-    return load_file(path, path.stem, path.parent)
+    return load_file(path, name=path.stem, neighbours=path.parent)
 
 
-def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
+def load_file(path: Path, *, name: str, neighbours: Path) -> SceneFile:
     """A scene file by path.
 
     Args:

@@ -40,14 +40,14 @@ def _plot(options: argparse.Namespace) -> int:
     try:
         if options.animate:
             path = folder / f"{shown.name}.{options.animate}"
-            animate(frames, shown, path)
+            animate(frames, shown, path=path)
         elif options.time is not None:
             frame = frames.nearest(_time(options.time))
             path = folder / f"{shown.name}_{frame.number:06d}.png"
-            plot_frame(frames, shown, frame, path)
+            plot_frame(frames, shown, frame=frame, path=path)
         else:
             path = folder / "overview.png"
-            plot_overview(frames, shown, path)
+            plot_overview(frames, shown, path=path)
     except OSError as error:
         raise SceneError("DIR", options.dir, f"it must be a folder that can be written ({error})") from None
     print(path)

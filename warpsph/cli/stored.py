@@ -87,7 +87,7 @@ class StoredScene:
         if "sha256" in code and _sha256(path) != code["sha256"]:
             raise SceneError("code.file", str(path), "it has changed since the run; its checks and probes count")
         folder = Path(instance("code.folder", code.get("folder", "."), str, "a folder"))
-        return load_file(path, self.name, self.path.parent / folder)
+        return load_file(path, name=self.name, neighbours=self.path.parent / folder)
 
     @cached_property
     def _values(self) -> dict[str, object]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 
 from .prose import Prose
@@ -25,6 +25,7 @@ class Row:
 
     quantity: str
     ours: float | str
+    _: KW_ONLY
     unit: str = "-"
     paper: float | str | None = None
     exact: float | str | None = None

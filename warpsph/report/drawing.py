@@ -35,13 +35,13 @@ class Panel:
     values: np.ndarray
 
 
-def grid(rows: int, columns: int, size: tuple[float, float], **options):
+def grid(rows: int, columns: int, *, size: tuple[float, float], **options):
     """A figure and its axes, an array (rows, columns)."""
     figure = new_figure(size)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def draw_curves(axes, curves: Sequence[Curve], x_label: str, y_label: str, above: bool = False) -> None:
+def draw_curves(axes, curves: Sequence[Curve], *, x_label: str, y_label: str, above: bool = False) -> None:
     """Draw lines into axes, their legend among them or above."""
     styles = iter(LINES)
     for curve in curves:
@@ -58,10 +58,10 @@ def draw_curves(axes, curves: Sequence[Curve], x_label: str, y_label: str, above
         axes.legend(frameon=False, fontsize=9, **place)
 
 
-def diagram(path: Path, curves: Sequence[Curve], x_label: str, y_label: str, **limits) -> Path:
+def diagram(path: Path, curves: Sequence[Curve], *, x_label: str, y_label: str, **limits) -> Path:
     """One diagram; `limits` are those of `Axes.set`, e.g. `ylim`."""
-    figure, axes = grid(1, 1, (7.0, 3.8))
-    draw_curves(axes[0, 0], curves, x_label, y_label, above=True)
+    figure, axes = grid(1, 1, size=(7.0, 3.8))
+    draw_curves(axes[0, 0], curves, x_label=x_label, y_label=y_label, above=True)
     axes[0, 0].set(**limits)
     return save_picture(figure, path)
 
@@ -69,9 +69,9 @@ def diagram(path: Path, curves: Sequence[Curve], x_label: str, y_label: str, **l
 def draw_fields(
     path: Path,
     panels: Sequence[Sequence[Panel]],
+    *,
     label: str,
     size: tuple[float, float],
-    *,
     shared: bool = True,
     edges: bool = True,
 ) -> Path:
@@ -85,7 +85,7 @@ def draw_fields(
         shared: whether all panels share one span of colours and one bar.
         edges: whether to draw the cells.
     """
-    figure, axes = grid(len(panels), len(panels[0]), size, sharex=True, sharey=True)
+    figure, axes = grid(len(panels), len(panels[0]), size=size, sharex=True, sharey=True)
     drawn = [(axes[i, k], panel) for i, row in enumerate(panels) for k, panel in enumerate(row)]
     low = np.min([panel.mesh.nodes.min(axis=0) for _, panel in drawn], axis=0)
     high = np.max([panel.mesh.nodes.max(axis=0) for _, panel in drawn], axis=0)

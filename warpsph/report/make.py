@@ -45,9 +45,9 @@ def make_report(folder: Path, *, quick: bool, device: str | None, jobs: int, qui
         + ("**Quick form:** the slope is coarser and shorter, the finest spacings are left out. " if quick else "")
         + "Differences are (ours − exact)/exact where there is an exact value, else to the paper's.",
     ]
-    write_markdown(folder / "report.md", TITLE, lead, sections)
+    write_markdown(folder / "report.md", sections, title=TITLE, lead=lead)
     page = folder / "report.html"
-    write_html(page, TITLE, lead, sections)
+    write_html(page, sections, title=TITLE, lead=lead)
     if not quiet:
         print(f"{page} and {folder / 'report.md'} written after {clock.perf_counter() - begin:.0f} s")
     return page

@@ -36,7 +36,7 @@ PAGE = """<!doctype html>
 """
 
 
-def write_markdown(path: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+def write_markdown(path: Path, sections: Sequence[Section], *, title: str, lead: Sequence[str]) -> None:
     """The Markdown file; pictures are referred to by their place beside it."""
     lines = [f"# {title}", ""]
     for text in lead:
@@ -58,7 +58,7 @@ def write_markdown(path: Path, title: str, lead: Sequence[str], sections: Sequen
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
-def write_html(path: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+def write_html(path: Path, sections: Sequence[Section], *, title: str, lead: Sequence[str]) -> None:
     """The HTML page, its pictures inside."""
     parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{_inline(text)}</p>" for text in lead), "<ul>"]
     parts += [f'<li><a href="#s{k}">{_inline(section.prose.title)}</a></li>' for k, section in enumerate(sections)]

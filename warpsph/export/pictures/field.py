@@ -25,7 +25,7 @@ def plot_field(simulation: Simulation, path: Path) -> None:
     _plot(view, simulation, simulation.scene.name, path)
 
 
-def plot_frame(frames: Frames, quantity: Quantity, frame: Frame, path: Path) -> None:
+def plot_frame(frames: Frames, quantity: Quantity, *, frame: Frame, path: Path) -> None:
     """One frame into a PNG, at the scale and colours of all frames."""
     _plot(View.of(frames, quantity), frame, frames.about["scene"], path)
 
@@ -37,7 +37,7 @@ def _plot(view: View, frame: Frame | Simulation, scene: str, path: Path) -> None
     save_picture(figure, path)
 
 
-def animate(frames: Frames, quantity: Quantity, path: Path) -> None:
+def animate(frames: Frames, quantity: Quantity, *, path: Path) -> None:
     """All frames into a GIF or an MP4, by the ending of the path.
 
     Raises:

@@ -19,7 +19,7 @@ WIDTH, BELOW = 12.0, 3.2  # of the sheet, and height of its lower part [inch]
 SNAPSHOTS = 6
 
 
-def plot_overview(frames: Frames, quantity: Quantity, path: Path) -> None:
+def plot_overview(frames: Frames, quantity: Quantity, *, path: Path) -> None:
     """The whole run on one sheet: the quantity at several times, the deformation, the histories."""
     view, chosen = View.of(frames, quantity), _evenly_chosen(frames)
     curves = curves_of(frames)

@@ -36,14 +36,17 @@ def section(results, picture) -> Section:
     toes = [Curve(f"Courant {r.parameters.courant:g}", r.history["time"], r.history["toe"]) for r in runs]
     pictures = [
         Picture(
-            draw_fields(picture("13"), [[strain]], "equivalent viscoplastic strain [-]", (9.0, 3.6)),
+            draw_fields(picture("13"), [[strain]], label="equivalent viscoplastic strain [-]", size=(9.0, 3.6)),
             "Fig. 13: viscoplastic strain at the end, on the deformed mesh.",
         ),
         Picture(
-            draw_fields(picture("14"), [moved[:2], moved[2:]], "displacement [m]", (11.0, 4.6)),
+            draw_fields(picture("14"), [moved[:2], moved[2:]], label="displacement [m]", size=(11.0, 4.6)),
             "Fig. 14: displacement on the deformed mesh (× 1).",
         ),
-        Picture(diagram(picture("toe"), toes, "time [s]", "displacement of the toe [m]"), "Run-out of the toe."),
+        Picture(
+            diagram(picture("toe"), toes, x_label="time [s]", y_label="displacement of the toe [m]"),
+            "Run-out of the toe.",
+        ),
     ]
     lines = [
         (f"{label} [{unit}]", *(float(r.history[name][-1]) for r in runs))
@@ -60,8 +63,8 @@ def section(results, picture) -> Section:
     return Section(
         prose=prose(SCENE, form=QUICK_FORM if short else ""),
         rows=[
-            Row("displacement of the toe", toe, "m", paper[0], None, first.seconds),
-            Row("largest strain", strained, "-", paper[1]),
+            Row("displacement of the toe", toe, unit="m", paper=paper[0], seconds=first.seconds),
+            Row("largest strain", strained, unit="-", paper=paper[1]),
         ],
         tables=[ReportTable("At three time steps:", ("", *(curve.label for curve in toes)), lines)],
         pictures=pictures,

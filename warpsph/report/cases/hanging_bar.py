@@ -25,15 +25,20 @@ def section(results, picture) -> Section:
     figure6 = draw_fields(
         picture("6"),
         [[_panel(f"{label} scheme", result) for label, result in both]],
-        "vertical velocity [m/s]",
-        (5.2, 7.0),
+        label="vertical velocity [m/s]",
+        size=(5.2, 7.0),
     )
     time = [
         Curve(f"{label} scheme", 1e3 * result.history["time"][1:], result.history["checkerboard"][1:])
         for label, result in both
     ]
     decay = diagram(
-        picture("checkerboard"), time, "time [ms]", "checkerboard of v_y [m/s]", yscale="log", ylim=(1e-8, 0.1)
+        picture("checkerboard"),
+        time,
+        x_label="time [ms]",
+        y_label="checkerboard of v_y [m/s]",
+        yscale="log",
+        ylim=(1e-8, 0.1),
     )
     complete, published = (result for _, result in both)
     left = [float(result.history["checkerboard"][-1]) for _, result in both]
@@ -41,11 +46,25 @@ def section(results, picture) -> Section:
     return Section(
         prose=prose("hanging_bar"),
         rows=[
-            Row("checkerboard of v_y, complete scheme", left[0], "m/s", "visible", 0.0, complete.seconds),
-            Row("checkerboard of v_y, published step", left[1], "m/s", "none visible", 0.0, published.seconds),
-            Row("ratio of the two", left[0] / left[1], "-"),
-            Row("deepest tip, complete scheme", float(complete.history["tip"].min()), "m", None, 2.0 * rest),
-            Row("deepest tip, published step", float(published.history["tip"].min()), "m", None, 2.0 * rest),
+            Row(
+                "checkerboard of v_y, complete scheme",
+                left[0],
+                unit="m/s",
+                paper="visible",
+                exact=0.0,
+                seconds=complete.seconds,
+            ),
+            Row(
+                "checkerboard of v_y, published step",
+                left[1],
+                unit="m/s",
+                paper="none visible",
+                exact=0.0,
+                seconds=published.seconds,
+            ),
+            Row("ratio of the two", left[0] / left[1], unit="-"),
+            Row("deepest tip, complete scheme", float(complete.history["tip"].min()), unit="m", exact=2.0 * rest),
+            Row("deepest tip, published step", float(published.history["tip"].min()), unit="m", exact=2.0 * rest),
         ],
         pictures=[
             Picture(figure6, "Fig. 6: vertical velocity on the deformed mesh at 0.2 s (displacements × 200)."),

@@ -52,24 +52,24 @@ def section(results, picture) -> Section:
         Row(
             "limit load, mean from 9 mm of settlement",
             perfect.check("limit_load"),
-            "N",
-            90650.0,
-            exact,
-            perfect.seconds,
+            unit="N",
+            paper=90650.0,
+            exact=exact,
+            seconds=perfect.seconds,
         ),
-        Row("load at the end", float(perfect.history["load"][-1]), "N", 90650.0, exact),
-        Row("peak load, softening", peak, "N", None, None, soft.seconds),
-        Row("load at the end, softening", end, "N"),
+        Row("load at the end", float(perfect.history["load"][-1]), unit="N", paper=90650.0, exact=exact),
+        Row("peak load, softening", peak, unit="N", seconds=soft.seconds),
+        Row("load at the end, softening", end, unit="N"),
     ]
     for kind, result in (("H = 0", perfect), ("softening", soft)):
         strain = result.at(STRAIN)
         rows += [
-            Row(f"largest strain, {kind}", float(strain.max()), "-", 0.06),
+            Row(f"largest strain, {kind}", float(strain.max()), unit="-", paper=0.06),
             Row(
                 f"strain of the 99.5th percentile of the nodes, {kind}",
                 float(np.percentile(strain, 99.5)),
-                "-",
-                0.06,
+                unit="-",
+                paper=0.06,
             ),
         ]
     bands = ReportTable(
@@ -128,8 +128,8 @@ def _figure22(perfect, soft, exact, path):
             Curve("softening, H = −1e6 Pa", 1e3 * soft.history["settlement"], 1e-3 * soft.history["load"]),
             Curve(f"exact, {1e-3 * exact:.2f} kN", [0.0, end], [1e-3 * exact] * 2, exact=True),
         ],
-        "settlement of the footing [mm]",
-        "load of the whole footing [kN]",
+        x_label="settlement of the footing [mm]",
+        y_label="load of the whole footing [kN]",
         ylim=(0.0, None),
     )
 
@@ -142,7 +142,7 @@ def _figure23(perfect, soft, path):
         ]
         for k, time in enumerate(TIMES)
     ]
-    return draw_fields(path, rows, "ε̄ [-]", (12.0, 11.5), edges=False, shared=False)
+    return draw_fields(path, rows, label="ε̄ [-]", size=(12.0, 11.5), edges=False, shared=False)
 
 
 def _figure24(perfect, soft, path):
@@ -157,11 +157,11 @@ def _figure24(perfect, soft, path):
         ]
         for k in (2, 3, 4)
     ]
-    return draw_fields(path, rows, "displacement [mm]", (11.0, 7.2), edges=False)
+    return draw_fields(path, rows, label="displacement [mm]", size=(11.0, 7.2), edges=False)
 
 
 def _traces(pair, ridges, path):
-    figure, axes = grid(2, 1, (9.0, 8.0))
+    figure, axes = grid(2, 1, size=(9.0, 8.0))
     for at, result, ridge, kind in zip(axes[:, 0], pair, ridges, ("H = 0", "softening"), strict=True):
         span = (0.0, 3.0 * float(np.median(ridge.strain)))
         colours = draw_cells(at, result.mesh, result.at(STRAIN), span=span)

@@ -46,22 +46,27 @@ def section(results, picture) -> Section:
     return Section(
         prose=prose("tension", rate=rate),
         rows=[
-            Row("held: growth rate, standard SPH", module.growth(standard[0][1], p), "1/s", "clumps", rate),
+            Row(
+                "held: growth rate, standard SPH",
+                module.growth(standard[0][1], p),
+                unit="1/s",
+                paper="clumps",
+                exact=rate,
+            ),
             Row(
                 "held: growth rate, two node sets",
                 module.growth(first.history, p),
-                "1/s",
-                "stable",
-                0.0,
-                first.seconds,
+                unit="1/s",
+                paper="stable",
+                exact=0.0,
+                seconds=first.seconds,
             ),
             Row(
                 "released: length at rest, two node sets",
                 float(published.history["length"][-1]),
-                "m",
-                None,
-                1.0,
-                published.seconds,
+                unit="m",
+                exact=1.0,
+                seconds=published.seconds,
             ),
         ],
         tables=[*_held_tables(named, module, p), _released_table(free)],
@@ -135,16 +140,16 @@ def _released_table(free) -> ReportTable:
 
 
 def _held(named, standard, result, p, path):
-    figure, axes = grid(2, 2, (10.5, 9.0))
+    figure, axes = grid(2, 2, size=(10.5, 9.0))
     tension, calm = (list(STRAINS).index(state) for state in ("tension", "no stress"))
     departures = [
         Curve(name, 1e3 * h[tension]["time"], h[tension]["departure"] / p.spacing) for name, h in named.items()
     ]
-    draw_curves(axes[0, 0], departures, "time [ms]", "RMS departure [Δx]")
+    draw_curves(axes[0, 0], departures, x_label="time [ms]", y_label="RMS departure [Δx]")
     checkerboards = [
         Curve(name, 1e3 * h[calm]["time"], 1e3 * h[calm]["checkerboard"]) for name, h in named.items()
     ]
-    draw_curves(axes[0, 1], checkerboards, "time [ms]", "checkerboard of v_x [mm/s]")
+    draw_curves(axes[0, 1], checkerboards, x_label="time [ms]", y_label="checkerboard of v_x [mm/s]")
     axes[0, 0].set(yscale="log", title="tension")
     axes[0, 1].set(ylim=(0.0, None), title="no stress")
     _nodes(axes[1, 0], standard.x, "standard SPH", BRIGHT)
@@ -155,7 +160,7 @@ def _held(named, standard, result, p, path):
 def _released(result, path):
     p = SimpleNamespace(**(vars(result.parameters) | {"duration": RELEASED[1]}))
     standard, _ = result.file.module.standard_sph(result.scene, p)
-    figure, axes = grid(2, 2, (11.0, 4.8), sharex=True, sharey=True)
+    figure, axes = grid(2, 2, size=(11.0, 4.8), sharex=True, sharey=True)
     moments = [f"{1e3 * time:.3g} ms" for time in result.times]
     _nodes(axes[0, 0], result.at("position", 0), "start", DARK)
     _nodes(axes[0, 1], standard.x, f"standard SPH, {1e3 * standard.time:.3g} ms", BRIGHT)

@@ -75,17 +75,31 @@ def section(results, picture) -> Section:
     formed, loads = _formed(perfect)
     softened = soft.history["load"]
     rows = [
-        Row("limit load, mean from 0.05 to 0.15 m", float(loads.mean()), "N", PAPER_LOADS, exact, perfect.seconds),
-        Row("load at 0.05 m", float(loads[0]), "N", PAPER_LOADS, exact),
-        Row("load at 0.15 m", float(loads[-1]), "N", PAPER_LOADS, exact),
-        Row("limit load over the footing's width", perfect.check("limit_load"), "N", None, exact),
-        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), "N", None, exact),
-        Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), "°", 45.0, 45.0),
-        Row("band angle, softening", soft.check("band_angle"), "°", 45.0, 45.0, soft.seconds),
-        Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), "-", 0.73),
-        Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), "-", 0.89),
-        Row("peak load, softening", float(softened.max()), "N", None, exact),
-        Row("load at the end, softening", float(softened[-1]), "N", "falls"),
+        Row(
+            "limit load, mean from 0.05 to 0.15 m",
+            float(loads.mean()),
+            unit="N",
+            paper=PAPER_LOADS,
+            exact=exact,
+            seconds=perfect.seconds,
+        ),
+        Row("load at 0.05 m", float(loads[0]), unit="N", paper=PAPER_LOADS, exact=exact),
+        Row("load at 0.15 m", float(loads[-1]), unit="N", paper=PAPER_LOADS, exact=exact),
+        Row("limit load over the footing's width", perfect.check("limit_load"), unit="N", exact=exact),
+        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), unit="N", exact=exact),
+        Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), unit="°", paper=45.0, exact=45.0),
+        Row(
+            "band angle, softening",
+            soft.check("band_angle"),
+            unit="°",
+            paper=45.0,
+            exact=45.0,
+            seconds=soft.seconds,
+        ),
+        Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), unit="-", paper=0.73),
+        Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), unit="-", paper=0.89),
+        Row("peak load, softening", float(softened.max()), unit="N", exact=exact),
+        Row("load at the end, softening", float(softened[-1]), unit="N", paper="falls"),
     ]
     above = formed[loads > 1.1 * exact]
     beyond = (
@@ -188,8 +202,8 @@ def _figure17(perfect, soft, exact, path):
             Curve("softening, H = −1e3 Pa", soft.history["settlement"], soft.history["load"]),
             Curve(f"exact, {exact:.1f} N", [0.0, end], [exact, exact], exact=True),
         ],
-        "settlement of the footing [m]",
-        "load [N]",
+        x_label="settlement of the footing [m]",
+        y_label="load [N]",
         ylim=(0.0, None),
     )
 
@@ -207,7 +221,7 @@ def _evolution(perfect, soft, path):
         for k, settlement in enumerate(SETTLEMENTS)
         if k > 0
     ]
-    return draw_fields(path, rows, "equivalent viscoplastic strain [-]", (8.5, 10.5), edges=False)
+    return draw_fields(path, rows, label="equivalent viscoplastic strain [-]", size=(8.5, 10.5), edges=False)
 
 
 def _figure19(perfect, soft, path):
@@ -219,11 +233,11 @@ def _figure19(perfect, soft, path):
         )
         for result in (perfect, soft)
     ]
-    return draw_fields(path, [row], "displacement [m]", (10.5, 5.0))
+    return draw_fields(path, [row], label="displacement [m]", size=(10.5, 5.0))
 
 
 def _bands(pair, path):
-    figure, axes = grid(1, len(pair), (10.5, 5.2), sharey=True)
+    figure, axes = grid(1, len(pair), size=(10.5, 5.2), sharey=True)
     for at, result in zip(axes[0], pair, strict=True):
         strain, nodes = result.at("equivalent_plastic_strain"), result.mesh.nodes
         band = result.file.module.band(result.mesh, strain)
@@ -238,7 +252,7 @@ def _bands(pair, path):
 
 def _widths(found, path):
     """The picture of the profiles across the bands, and spacing → widths [m] without and with softening."""
-    figure, axes = grid(1, 2, (10.5, 4.0), sharey=True)
+    figure, axes = grid(1, 2, size=(10.5, 4.0), sharey=True)
     widths, curves = {}, {"perfectly viscoplastic": [], "softening": []}
     for result in sorted(found, key=lambda result: -result.parameters.spacing):
         strain = result.at("equivalent_plastic_strain", SETTLEMENTS.index(WIDTH_AT))
@@ -248,7 +262,9 @@ def _widths(found, path):
         widths.setdefault(result.parameters.spacing, []).append(width_at_half(across, profile))
         curves[_kind(result)].append(Curve(f"Δx = {result.parameters.spacing:g} m", across, profile))
     for at, (kind, lines) in zip(axes[0], curves.items(), strict=True):
-        draw_curves(at, lines, "distance from the band's axis [m]", "equivalent viscoplastic strain [-]")
+        draw_curves(
+            at, lines, x_label="distance from the band's axis [m]", y_label="equivalent viscoplastic strain [-]"
+        )
         at.set_title(kind, fontsize=10)
         at.label_outer()
     return save_picture(figure, path), widths

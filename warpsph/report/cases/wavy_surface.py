@@ -26,8 +26,11 @@ def section(results, picture) -> Section:
     return Section(
         prose=prose(SCENE),
         rows=[
-            *(Row(f"{b}, mean angle, improved normals", float(bodies[b][0]), "°", None, 0.0) for b in bodies),
-            *(Row(f"{b}, mean angle, Marrone's normals", float(bodies[b][1]), "°", None, 0.0) for b in bodies),
+            *(Row(f"{b}, mean angle, improved normals", float(bodies[b][0]), unit="°", exact=0.0) for b in bodies),
+            *(
+                Row(f"{b}, mean angle, Marrone's normals", float(bodies[b][1]), unit="°", exact=0.0)
+                for b in bodies
+            ),
         ],
         pictures=[
             Picture(
