@@ -89,7 +89,7 @@ def scene(p):
         output=Output(
             probes=(
                 Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node((0.0, SIZE[1])), 1]),
-                Probe("load", "N", lambda s: 2.0 * half_load(s)),
+                Probe("load", "N/m", lambda s: 2.0 * half_load(s)),
             ),
             curve=("settlement", "load"),
             curve_reference=("exact limit load", limit_load(p)),
@@ -118,4 +118,4 @@ def checks(run):
         left = float(load[-1] / load.max())
         return [reaches, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
     plateau = settlement >= 0.6 * settlement[-1]
-    return [Check("limit_load", float(np.mean(load[plateau])), limit_load(p), "N", bound=0.03), reaches]
+    return [Check("limit_load", float(np.mean(load[plateau])), limit_load(p), "N/m", bound=0.03), reaches]

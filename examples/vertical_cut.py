@@ -85,7 +85,7 @@ def scene(p):
         output=Output(
             probes=(
                 Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node(SIZE), 1]),
-                Probe("load", "N", EdgeForce(footing, axis=1)),
+                Probe("load", "N/m", EdgeForce(footing, axis=1)),
                 Probe("width", "m", lambda s: width(s.mesh, s.field("position"))),
             ),
             curve=("settlement", "load"),
@@ -120,8 +120,8 @@ def checks(run):
         return [angle, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
     formed = (settlement >= MECHANISM[0]) & (settlement <= MECHANISM[1])
     return [
-        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N", bound=0.10, bound_below=0.02),
-        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N", bound=0.10, bound_below=0.02),
+        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
+        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
         angle,
         Check("largest_strain", float(strain.max()), PAPER_STRAIN, "-", 0.20),
     ]

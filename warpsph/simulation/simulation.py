@@ -54,7 +54,7 @@ class Simulation:
 
     Attributes:
         scene: the scene.
-        lattice: its initial lattice.
+        mesh: its initial nodes, cells and boundary faces.
         time: simulated time [s].
         steps: number of steps made.
         shortest_step, longest_step: smallest and largest Δt used so far [s].

@@ -52,14 +52,14 @@ def section(results, picture) -> Section:
         Row(
             "limit load, mean from 9 mm of settlement",
             perfect.check("limit_load"),
-            unit="N",
+            unit="N/m",
             paper=90650.0,
             exact=exact,
             seconds=perfect.seconds,
         ),
-        Row("load at the end", float(perfect.history["load"][-1]), unit="N", paper=90650.0, exact=exact),
-        Row("peak load, softening", peak, unit="N", seconds=soft.seconds),
-        Row("load at the end, softening", end, unit="N"),
+        Row("load at the end", float(perfect.history["load"][-1]), unit="N/m", paper=90650.0, exact=exact),
+        Row("peak load, softening", peak, unit="N/m", seconds=soft.seconds),
+        Row("load at the end, softening", end, unit="N/m"),
     ]
     for kind, result in (("H = 0", perfect), ("softening", soft)):
         strain = result.at(STRAIN)
@@ -88,7 +88,7 @@ def section(results, picture) -> Section:
     )
     loads = ReportTable(
         "The limit load at other spacings and rates (Δx = 0.1 m and 3e-3 m/s² unless said):",
-        ("", "mean load [N]", "to exact", "run time [s]"),
+        ("", "mean load [N/m]", "to exact", "run time [s]"),
         [
             (
                 _variation(result),
@@ -126,10 +126,10 @@ def _figure22(perfect, soft, exact, path):
                 1e-3 * perfect.history["load"],
             ),
             Curve("softening, H = −1e6 Pa", 1e3 * soft.history["settlement"], 1e-3 * soft.history["load"]),
-            Curve(f"exact, {1e-3 * exact:.2f} kN", [0.0, end], [1e-3 * exact] * 2, exact=True),
+            Curve(f"exact, {1e-3 * exact:.2f} kN/m", [0.0, end], [1e-3 * exact] * 2, exact=True),
         ],
         x_label="settlement of the footing [mm]",
-        y_label="load of the whole footing [kN]",
+        y_label="load of the whole footing [kN/m]",
         ylim=(0.0, None),
     )
 

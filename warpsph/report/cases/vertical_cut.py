@@ -78,15 +78,15 @@ def section(results, picture) -> Section:
         Row(
             "limit load, mean from 0.05 to 0.15 m",
             float(loads.mean()),
-            unit="N",
+            unit="N/m",
             paper=PAPER_LOADS,
             exact=exact,
             seconds=perfect.seconds,
         ),
-        Row("load at 0.05 m", float(loads[0]), unit="N", paper=PAPER_LOADS, exact=exact),
-        Row("load at 0.15 m", float(loads[-1]), unit="N", paper=PAPER_LOADS, exact=exact),
-        Row("limit load over the footing's width", perfect.check("limit_load"), unit="N", exact=exact),
-        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), unit="N", exact=exact),
+        Row("load at 0.05 m", float(loads[0]), unit="N/m", paper=PAPER_LOADS, exact=exact),
+        Row("load at 0.15 m", float(loads[-1]), unit="N/m", paper=PAPER_LOADS, exact=exact),
+        Row("limit load over the footing's width", perfect.check("limit_load"), unit="N/m", exact=exact),
+        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), unit="N/m", exact=exact),
         Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), unit="°", paper=45.0, exact=45.0),
         Row(
             "band angle, softening",
@@ -98,8 +98,8 @@ def section(results, picture) -> Section:
         ),
         Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), unit="-", paper=0.73),
         Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), unit="-", paper=0.89),
-        Row("peak load, softening", float(softened.max()), unit="N", exact=exact),
-        Row("load at the end, softening", float(softened[-1]), unit="N", paper="falls"),
+        Row("peak load, softening", float(softened.max()), unit="N/m", exact=exact),
+        Row("load at the end, softening", float(softened[-1]), unit="N/m", paper="falls"),
     ]
     above = formed[loads > 1.1 * exact]
     beyond = (
@@ -131,7 +131,7 @@ def _kind(result) -> str:
 
 
 def _formed(result):
-    """Settlements [m] and loads [N] while the mechanism stands and the shape has hardly changed."""
+    """Settlements [m] and loads [N/m] while the mechanism stands and the shape has hardly changed."""
     low, high = result.file.module.MECHANISM
     settlement, load = result.history["settlement"], result.history["load"]
     inside = (settlement >= low) & (settlement <= high * (1.0 + 1e-9))
@@ -149,7 +149,7 @@ def _loads(results, perfect, finer, exact) -> ReportTable:
     ]
     return ReportTable(
         "What the limit load depends on (Δx = 0.5 m, Courant number 1 and 3e-5 m/s² unless said):",
-        ("", "mean load [N]", "to exact", "load at 0.15 m [N]", "to exact", "run time [s]"),
+        ("", "mean load [N/m]", "to exact", "load at 0.15 m [N/m]", "to exact", "run time [s]"),
         [_load_line(name, result, exact) for name, result in varied],
     )
 
@@ -200,10 +200,10 @@ def _figure17(perfect, soft, exact, path):
         [
             Curve("perfectly viscoplastic, H = 0", perfect.history["settlement"], perfect.history["load"]),
             Curve("softening, H = −1e3 Pa", soft.history["settlement"], soft.history["load"]),
-            Curve(f"exact, {exact:.1f} N", [0.0, end], [exact, exact], exact=True),
+            Curve(f"exact, {exact:.1f} N/m", [0.0, end], [exact, exact], exact=True),
         ],
         x_label="settlement of the footing [m]",
-        y_label="load [N]",
+        y_label="load [N/m]",
         ylim=(0.0, None),
     )
 
