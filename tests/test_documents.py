@@ -140,3 +140,10 @@ def test_sections_of_the_method_that_the_code_refers_to_exist():
         for path in (ROOT / folder).rglob("*.py"):
             for number in re.findall(r"METHOD,?\s+section\s+(\d+)", path.read_text(encoding="utf-8")):
                 assert number in sections, f"{path.relative_to(ROOT)}: METHOD section {number}"
+
+
+def test_places_of_the_docs_that_the_code_refers_to_exist():
+    for folder in ("warpsph", "examples", "tests", "tools"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for page, anchor in re.findall(r"\b((?:docs/)?\w+\.md)#([\w-]+)", path.read_text(encoding="utf-8")):
+                assert anchor in anchors(ROOT / page), f"{path.relative_to(ROOT)}: {page}#{anchor}"

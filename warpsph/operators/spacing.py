@@ -1,7 +1,7 @@
 """How much sooner than at the start a wave is at the next node, as far as the time step can feel it.
 
 Kernels are stretched and turned with the cells, so in a cell's own coordinates ξ every gradient is a lattice's,
-whose waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 3). In space that gradient grows with ∇ξ, at most by
+whose waves are stable for c_p Δt ≤ 2 √m₂ Δx (METHOD section 4). In space that gradient grows with ∇ξ, at most by
 its largest singular value: Δx is the least singular value of the cell's edges ∂x/∂ξ, the least distance across it.
 The stiffness stays what it is while the density falls where a body is stretched, so that c_p ∝ ρ^−½ there.
 """
