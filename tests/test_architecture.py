@@ -1,6 +1,7 @@
 """Imports point one way: every room of the package only knows the rooms below it."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,10 @@ def test_nothing_below_the_exports_draws():
 
 def test_files_are_small_enough_for_one_purpose():
     assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 400 for path in FILES)
+
+
+def test_contributing_lists_the_rooms_in_their_order():
+    text = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`warpsph/[^|]*) \|", text, re.MULTILINE)
+    rooms = [room for row in rows for room in re.findall(r"`warpsph/(\w+)[./]", row)]
+    assert rooms == [*ROOMS, "frames"]
