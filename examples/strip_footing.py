@@ -41,18 +41,12 @@ NEAREST, FARTHEST = 1.2, 3.0
 SMOOTHING = 0.3  # of the strain along a ray [m]
 
 NUMERICS = PUBLISHED
+SOIL = PerzynaVonMises(young_modulus=2.5e7, poisson_ratio=0.4, density=2000.0, fluidity=2.0, yield_size=15e3)
 PARAMETERS = (
     Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-3, "m/s²", "rate at which the footing's velocity grows"),
     Parameter("duration", 3.2, "s", "simulated time"),
-    Parameter("young_modulus", 2.5e7, "Pa", "Young's modulus"),
-    Parameter("poisson_ratio", 0.4, "-", "Poisson's ratio"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
-    Parameter("yield_size", 15e3, "Pa", "initial size of the von Mises surface Y0"),
-    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
-    Parameter("residual_ratio", 0.1, "-", "softening ends at this share of Y0 (our choice)"),
+    *Parameter.of(SOIL),
 )
 
 
@@ -67,16 +61,7 @@ def scene(p):
     half_load = EdgeForce(footing, axis=1)
     return Scene(
         shape=Box(SIZE, p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            poisson_ratio=p.poisson_ratio,
-            density=p.density,
-            fluidity=p.fluidity,
-            exponent=p.exponent,
-            yield_size=p.yield_size,
-            hardening=p.hardening,
-            residual_ratio=p.residual_ratio,
-        ),
+        material=SOIL.with_parameters(p),
         conditions=[
             Roller(edge("left")),
             Roller(edge("right")),

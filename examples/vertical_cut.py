@@ -38,18 +38,12 @@ MECHANISM = (0.05, 0.15)  # settlements between which the mechanism stands and t
 PAPER_STRAIN = 0.73  # largest ε̄ with H = 0
 
 NUMERICS = PUBLISHED
+SOIL = PerzynaVonMises(young_modulus=1e5, poisson_ratio=0.35, density=2000.0, fluidity=2.0, yield_size=200.0)
 PARAMETERS = (
     Parameter("spacing", 0.5, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-5, "m/s²", "rate at which the footing's velocity grows"),
     Parameter("settlement", 0.45, "m", "settlement of the footing at the end"),
-    Parameter("young_modulus", 1e5, "Pa", "Young's modulus"),
-    Parameter("poisson_ratio", 0.35, "-", "Poisson's ratio"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
-    Parameter("yield_size", 200.0, "Pa", "initial size of the von Mises surface Y0"),
-    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
-    Parameter("residual_ratio", 0.1, "-", "softening ends at this share of Y0 (our choice)"),
+    *Parameter.of(SOIL),
 )
 
 
@@ -63,16 +57,7 @@ def scene(p):
     beside = edge("top") & where(lambda x, y: x < SIZE[0] - WIDTH)
     return Scene(
         shape=Box(SIZE, p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            poisson_ratio=p.poisson_ratio,
-            density=p.density,
-            fluidity=p.fluidity,
-            exponent=p.exponent,
-            yield_size=p.yield_size,
-            hardening=p.hardening,
-            residual_ratio=p.residual_ratio,
-        ),
+        material=SOIL.with_parameters(p),
         conditions=[
             Roller(edge("left")),
             Fixed(edge("bottom")),

@@ -1,4 +1,4 @@
-"""Writes the tables of the docs that follow from the code: numerical defaults, fields, options of the commands.
+"""Writes the tables of the docs that follow from the code: defaults, parameters, fields, options of the commands.
 
     python tools/tables.py
 
@@ -9,6 +9,7 @@ A table stands in a page between `<!-- table: NAME -->` and `<!-- end -->`; `TAB
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -16,6 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from warpsph.cli.main import _parser
+from warpsph.scene.material import Elastic, PerzynaVonMises
 from warpsph.scene.parameter import numerical_parameters
 from warpsph.simulation.fields import FIELDS
 
@@ -45,6 +47,17 @@ def fields() -> str:
     return table(("field", "unit", "shape", "meaning"), rows)
 
 
+def parameters(material: type) -> str:
+    """What a material takes."""
+    rows = []
+    for entry in dataclasses.fields(material):
+        bounds = [f"{name.replace('_', ' ')} {value:g}" for name, value in entry.metadata["bounds"].items()]
+        default = "" if entry.default is dataclasses.MISSING else f"`{entry.default:g}`"
+        row = entry.metadata["unit"], entry.metadata["meaning"], ", ".join(bounds), default
+        rows.append((f"`{entry.name}`", *row))
+    return table(("parameter", "unit", "meaning", "allowed", "default"), rows)
+
+
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The commands by name."""
     (subparsers,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -66,6 +79,7 @@ def options(command: argparse.ArgumentParser) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "numerics": numerics,
     "fields": fields,
+    **{f"parameters of {kind.__name__}": partial(parameters, kind) for kind in (Elastic, PerzynaVonMises)},
     **{f"options of {name}": partial(options, command) for name, command in commands().items()},
 }
 
