@@ -8,8 +8,6 @@ from warpsph import (
     Box,
     Checkpoint,
     Fixed,
-    Frames,
-    FrameWriter,
     Numerics,
     Scene,
     SceneError,
@@ -18,6 +16,7 @@ from warpsph import (
     write_checkpoint,
 )
 from warpsph.export.usd import write_stage
+from warpsph.frames import Frames, FrameWriter
 from warpsph.materials import LAWS
 from warpsph.mesh.continuum import CONTINUA
 from warpsph.scene.document import decode, encode

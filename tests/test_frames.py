@@ -23,12 +23,12 @@ from warpsph import (
     edge,
     where,
 )
+from warpsph.analysis import green_strain
 from warpsph.cli.main import main
 from warpsph.export import frames as frames_module
-from warpsph.export.frames import Frames, FrameWriter, evenly
 from warpsph.export.quantity import quantity
 from warpsph.export.walls import WallMesh, walls_of
-from warpsph.simulation.fields import green_strain
+from warpsph.frames import Frames, FrameWriter, evenly
 from warpsph.simulation.history import read_history
 
 

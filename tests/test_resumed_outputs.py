@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 
-from warpsph import Frames
 from warpsph.cli.main import main
 from warpsph.cli.stored import read_toml
+from warpsph.frames import Frames
 from warpsph.simulation.checkpoint import Checkpoint
 
 SCENE = '''"""Block that is pressed; a signal comes after the step `stop_at`."""

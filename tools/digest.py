@@ -8,9 +8,9 @@ free surfaces, turning edges, drives, body force, damping and both source scheme
 bit of every field after so many steps, and how often the lists were built. A digest holds on one kind of machine
 and with one version of Warp only: make both files in one place.
 
-Kernels are compiled without fused multiplications and additions here. Which of a·b + c·d is fused is the compiler's
-choice, made anew for every shape of the code around it: with it, digests of equal formulas differ. `--fused`
-compiles them as runs do.
+Kernels are compiled without fused multiplications and additions here. Which product of a·b + c·d is fused is the
+compiler's choice, made anew for every shape of the code around it: with it, digests of equal formulas differ.
+`--fused` compiles kernels as runs do.
 """
 
 from __future__ import annotations

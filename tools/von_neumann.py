@@ -35,7 +35,8 @@ from warpsph.operators.checkerboard import STRESS_SHARE
 from warpsph.operators.front import STRENGTH
 from warpsph.operators.neighbour_sums import EDGE
 from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
-from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
+from warpsph.scene.numerics import KERNELS, Numerics
+from warpsph.scene.scheme import SCHEMES
 from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
 COURANT = (0.3, 0.5, 0.8, 0.95)
@@ -248,7 +249,7 @@ def main(arguments: list[str] | None = None) -> int:
         for mesh in meshes:
             numerics.check_support(CONTINUA[mesh.dim])
         if options.limits:
-            for mesh, scheme in itertools.product(meshes, VELOCITY_SCHEMES):
+            for mesh, scheme in itertools.product(meshes, SCHEMES):
                 print(f"{mesh.dim}D {scheme}: {largest_courant(mesh, scheme):.3f}")
             return 0
         options.out.mkdir(parents=True, exist_ok=True)

@@ -18,16 +18,8 @@ A scene is built from named parts and run by a `Simulation`:
 
 __version__ = "0.1.0"
 
-from .analysis.measures import (
-    Sampler,
-    checkerboard_amplitude,
-    fit_band,
-    growth_rate,
-    smallest_distance,
-    trace_ridge,
-)
+from . import analysis, frames
 from .errors import NonFiniteError, SceneError, WarpSPHError
-from .export.frames import Frames, FrameWriter
 from .scene import (
     PUBLISHED,
     BodyForce,
@@ -74,8 +66,6 @@ __all__ = [
     "EdgeForce",
     "Elastic",
     "Fixed",
-    "FrameWriter",
-    "Frames",
     "Free",
     "FreeSurface",
     "History",
@@ -94,21 +84,17 @@ __all__ = [
     "Ramp",
     "Roller",
     "Rotating",
-    "Sampler",
     "Scene",
     "SceneError",
     "Shape",
     "Simulation",
     "Table",
     "WarpSPHError",
-    "checkerboard_amplitude",
+    "analysis",
     "edge",
     "everywhere",
-    "fit_band",
-    "growth_rate",
+    "frames",
     "region",
-    "smallest_distance",
-    "trace_ridge",
     "where",
     "write_checkpoint",
 ]

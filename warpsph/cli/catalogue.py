@@ -18,7 +18,7 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -87,22 +87,20 @@ class SceneFile:
 
     def build_from(self, values: Mapping[str, object]) -> Scene:
         """The scene with these values of all parameters."""
-        with self.blamed():
+        with self.errors_located():
             scene = self.module.scene(namespace(values))
-        instance(f"{self.name}.scene(p)", scene, Scene, "a Scene")
-        object.__setattr__(scene, "name", self.name)
-        return scene
+            return replace(instance(f"{self.name}.scene(p)", scene, Scene, "a Scene"), name=self.name)
 
     def checks(self, run: SimpleNamespace) -> list[Check]:
         """The checks of a finished run."""
         if not hasattr(self.module, "checks"):
             return []
-        with self.blamed():
+        with self.errors_located():
             checks = self.module.checks(run)
         return list(listed(f"{self.name}.checks(run)", checks, Check, "a sequence of Check"))
 
     @contextlib.contextmanager
-    def blamed(self) -> Iterator[None]:
+    def errors_located(self) -> Iterator[None]:
         """Turns what a function of the file raises into a `SceneError` that names the line."""
         try:
             yield
@@ -125,10 +123,10 @@ def load(name: str) -> SceneFile:
     path = scenes.get(name, Path(name).absolute())
     if not path.is_file():
         raise SceneError("scene", name, f"{one_of(scenes, name)}, or the path of a scene file")
-    return load_file(path, path.stem, path.parent)
+    return load_file(path, name=path.stem, neighbours=path.parent)
 
 
-def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
+def load_file(path: Path, *, name: str, neighbours: Path) -> SceneFile:
     """A scene file by path.
 
     Args:

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
@@ -16,9 +17,12 @@ from .catalogue import load, shipped
 from .exporting import add_export, recorders
 from .plotting import add_plot
 from .restart import Restart, parse_interval, settings_of
-from .runner import run, writable
+from .runner import run
 from .settings import add_settings, chosen
 from .stored import SCENE, open_scene
+
+# Rooms above this one add their commands by these modules: a name, since imports point down.
+FURTHER = ("warpsph.report.command",)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,20 +75,8 @@ def _parser() -> argparse.ArgumentParser:
 
     add_plot(commands)
     add_export(commands)
-
-    reporting = commands.add_parser(
-        "report",
-        help="run every case of the paper and lay it out beside the paper's and the exact results",
-        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call "
-        "of this version with these parameters has finished are kept; delete a run's folder to repeat it.",
-    )
-    reporting.add_argument("--quick", action="store_true", help="coarser and shorter where a case takes minutes")
-    reporting.add_argument(
-        "--out", metavar="DIR", help="folder of the report (default: runs/report, or report-quick)"
-    )
-    reporting.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
-    reporting.add_argument("--jobs", type=int, default=2, help="runs at a time (default: 2)")
-    reporting.set_defaults(command=_report)
+    for module in FURTHER:
+        import_module(module).add_parser(commands)
     return parser
 
 
@@ -133,24 +125,6 @@ def _checkpoint(folder: Path, out: str | None) -> Checkpoint:
         again = f"warpsph run {folder / SCENE} --out {folder}"
         raise SceneError("--resume", str(folder), f"it has no checkpoint yet; start again with: {again}")
     return Checkpoint.read(folder / CHECKPOINT)
-
-
-def _report(options: argparse.Namespace) -> int:
-    from ..report.command import report  # matplotlib, and all cases: slow to import
-
-    if options.jobs < 1:
-        raise SceneError("--jobs", options.jobs, "it must be at least 1")
-    default = Path("runs") / ("report-quick" if options.quick else "report")
-    folder = writable(Path(options.out or default))
-    try:
-        report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
-    except StoppedError as stop:
-        print(f"warpsph: {stop}", file=sys.stderr)
-        return stop.status
-    except KeyboardInterrupt:
-        print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
-    return 0
 
 
 if __name__ == "__main__":

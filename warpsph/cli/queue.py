@@ -62,9 +62,9 @@ def make_missing(
                     finished, ready = finished + 1, ready + cost[run]
                     if not quiet:
                         elapsed = clock.perf_counter() - begin
-                        said = "" if error is None else f": {error}"
+                        reason = "" if error is None else f": {error}"
                         bar.write(
-                            f"[{finished}/{len(missing)}] {run.name} ({elapsed:.0f} s){said}", file=sys.stdout
+                            f"[{finished}/{len(missing)}] {run.name} ({elapsed:.0f} s){reason}", file=sys.stdout
                         )
                         sys.stdout.flush()
                 if show:

@@ -12,8 +12,9 @@ from typing import Protocol
 
 from .. import __version__
 from ..errors import NonFiniteError, SceneError, StoppedError
-from ..export.plots import plot_field, plot_history
-from ..export.surface_plot import plot_surface
+from ..export.pictures.field import plot_field
+from ..export.pictures.history import plot_history
+from ..export.pictures.surface import plot_surface
 from ..scene.check import Check
 from ..scene.output import component
 from ..scene.scene import Scene
@@ -76,13 +77,13 @@ def run(
     if simulation.steps:
         say(f"goes on from step {simulation.steps}, t = {simulation.time:.6g} s")
     end = scene.duration if settings.until is None else settings.until
-    with file.blamed():
+    with file.errors_located():
         history = History(simulation, folder / "history.csv", restart.history)
     progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
     observers = [history, progress, *(watch(simulation) for watch in watching)]
     begin, error, stop = clock.perf_counter(), None, None
     try:
-        with file.blamed(), restart.watching(simulation, history, folder, settings) as checkpoints:
+        with file.errors_located(), restart.watching(simulation, history, folder, settings) as checkpoints:
             simulation.run(until=end, observers=[*observers, checkpoints])
             history.sample(simulation)
     except NonFiniteError as failure:

@@ -87,7 +87,7 @@ class StoredScene:
         if "sha256" in code and _sha256(path) != code["sha256"]:
             raise SceneError("code.file", str(path), "it has changed since the run; its checks and probes count")
         folder = Path(instance("code.folder", code.get("folder", "."), str, "a folder"))
-        return load_file(path, self.name, self.path.parent / folder)
+        return load_file(path, name=self.name, neighbours=self.path.parent / folder)
 
     @cached_property
     def _values(self) -> dict[str, object]:
@@ -128,9 +128,9 @@ class StoredScene:
         """The checks of a finished run, if there is a scene file."""
         return self.source.checks(run) if self.source else []
 
-    def blamed(self) -> contextlib.AbstractContextManager:
+    def errors_located(self) -> contextlib.AbstractContextManager:
         """Turns what the scene file's functions raise into a `SceneError`."""
-        return self.source.blamed() if self.source else contextlib.nullcontext()
+        return self.source.errors_located() if self.source else contextlib.nullcontext()
 
 
 def open_scene(name: str) -> SceneFile | StoredScene:

@@ -88,9 +88,9 @@ class Member(SceneRun):
             status = _call(command, folder)
         if status not in (0, 1):
             (folder / "summary.json").unlink(missing_ok=True)  # its checks raised: it is not done
-            raise RuntimeError(said(folder) if status > 0 else f"its process ended by signal {-status}")
+            raise RuntimeError(last_line(folder) if status > 0 else f"its process ended by signal {-status}")
         if not (folder / "summary.json").is_file():
-            raise RuntimeError(said(folder))
+            raise RuntimeError(last_line(folder))
 
 
 def _call(command: Sequence[str], folder: Path) -> int:
@@ -110,7 +110,7 @@ def _call(command: Sequence[str], folder: Path) -> int:
         _processes.discard(process)
 
 
-def said(folder: Path) -> str:
+def last_line(folder: Path) -> str:
     """The last line of a run's log."""
     with suppress(OSError, IndexError):
         return (folder / "log.txt").read_text(encoding="utf-8").splitlines()[-1].removeprefix("warpsph: ")
@@ -156,7 +156,7 @@ def row(member: Member, folder: Path) -> dict[str, object]:
     """What a member gave: its settings, how it ended, its checks, its metrics, and the end of its history."""
     found: dict[str, object] = {"run": member.name, **dict(s.split("=", 1) for s in member.settings)}
     if not member.done(folder):
-        return found | {"status": "failed to run", "message": said(folder)}
+        return found | {"status": "failed to run", "message": last_line(folder)}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     checks = summary["checks"]
     status = "passed" if all(check["passed"] for check in checks) else "failed"

@@ -20,9 +20,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from ..analysis import green_strain, mean_stress, von_mises
 from ..errors import SceneError, one_of
 from ..mesh.mesh import Mesh
-from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
+from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
 from ..simulation.summary import write_json
 from ..storage.files import whole
@@ -153,7 +154,7 @@ class Frame:
         number: index of the time asked for.
         time: simulated time [s].
         step: number of the step.
-        lattice: the initial lattice.
+        mesh: the initial mesh.
         stored: the stored fields, name → values.
     """
 
@@ -187,7 +188,7 @@ class Frames(Sequence):
         about: what `about.json` says.
         times: those asked for [s].
         rate: frames a second of simulated time [1/s].
-        lattice: the initial lattice.
+        mesh: the initial mesh.
         walls: what surrounds the body.
 
     Raises:
@@ -207,7 +208,7 @@ class Frames(Sequence):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The initial lattice."""
+        """The initial mesh."""
         parts = {name: self._body[name] for name in Mesh.__dataclass_fields__}
         return Mesh(**parts | {"spacing": float(parts["spacing"])})
 

@@ -14,9 +14,8 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, Vt
 
 from ..storage.files import whole
-from .colours import Colouring
+from .colours import Colouring, percentiles, span_of
 from .frames import Frames
-from .plots import percentiles, span_of
 from .quantity import quantity
 from .usd import ROOT, Drawing, write_stage
 

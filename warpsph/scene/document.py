@@ -41,7 +41,7 @@ INITIAL_FIELDS = ("velocity", "stress")
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class InitialField:
     """An initial field by its values: one part a component, each a number or an array of one value a node."""
 
     parts: tuple
@@ -128,7 +128,7 @@ class _Reader:
         values = self.value(value, name)
         if not isinstance(values, np.ndarray | tuple):
             raise SceneError(name, value, "it must be a list of numbers, one a component, or {values = NAME}")
-        return Field(tuple(values.T if isinstance(values, np.ndarray) else values))
+        return InitialField(tuple(values.T if isinstance(values, np.ndarray) else values))
 
     def value(self, value: object, path: str) -> object:
         """A value at a place."""

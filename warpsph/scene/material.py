@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, field, fields, replace
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from ..mesh.continuum import Continuum
 from ..validate import number
 
 
+def parameter(unit: str, meaning: str, *, default: object = MISSING, **bounds: float):
+    """A parameter of a material: the one place of its unit, its meaning and its bounds, those of `number`."""
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "bounds": bounds})
+
+
 @dataclass(frozen=True, kw_only=True)
 class Elastic:
-    """Isotropic linear elasticity.
-
-    Args:
-        young_modulus: E [Pa], > 0.
-        poisson_ratio: ν [-], in (−1, 0.5); unused by a bar, which is in uniaxial stress.
-        density: ρ [kg/m³], > 0.
+    """Isotropic linear elasticity; a bar is in uniaxial stress.
 
     Raises:
         SceneError: a parameter is not allowed.
@@ -30,17 +30,24 @@ class Elastic:
     warpsph.errors.SceneError: density = -1.0 is not allowed: it must be a finite number above 0.0
     """
 
-    young_modulus: float
-    density: float
-    poisson_ratio: float = 0.0
+    young_modulus: float = parameter("Pa", "Young's modulus E", above=0.0)
+    poisson_ratio: float = parameter(
+        "-", "Poisson's ratio ν, without effect in a bar", default=0.0, above=-1.0, below=0.5
+    )
+    density: float = parameter("kg/m³", "density ρ", above=0.0)
 
     def __post_init__(self):
-        self._check("young_modulus", above=0.0)
-        self._check("density", above=0.0)
-        self._check("poisson_ratio", above=-1.0, below=0.5)
+        for entry in fields(self):
+            if "bounds" in entry.metadata:
+                self._check(entry.name, **entry.metadata["bounds"])
 
-    def _check(self, field: str, **bounds: float) -> None:
-        object.__setattr__(self, field, number(field, getattr(self, field), **bounds))
+    def _check(self, name: str, **bounds: float) -> None:
+        object.__setattr__(self, name, number(name, getattr(self, name), **bounds))
+
+    def with_parameters(self, values: object) -> Elastic:
+        """The material with what `values`, a scene's p, has of its parameters; see `Parameter.of`."""
+        given = {entry.name: getattr(values, entry.name) for entry in fields(self) if hasattr(values, entry.name)}
+        return replace(self, **given)
 
     @property
     def shear_modulus(self) -> float:
@@ -83,36 +90,27 @@ class Elastic:
 class PerzynaVonMises(Elastic):
     """Perzyna viscoplasticity with von Mises yield: dε̄/dt = γ ⟨(q − Y)/Y⟩ᴺ, Y = max(Y0 + H ε̄, r Y0).
 
-    Args:
-        fluidity: γ [1/s], ≥ 0.
-        yield_size: initial size of the yield surface Y0 [Pa], > 0; a uniaxial yield stress.
-        exponent: N [-], ≥ 1.
-        hardening: H = dY/dε̄ [Pa]; negative softens.
-        residual_ratio: r [-], in (0, 1]: softening ends at Y = r Y0 (the paper lets Y reach zero).
-
     Raises:
         SceneError: a parameter is not allowed.
 
-    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ; docs/method.md, section 1.
+    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ (METHOD section 1); the paper lets Y reach zero.
 
     >>> soil = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
     >>> soil.flow_rate(dim=1)  # E γ N/Y0 in a bar
     400.0
     """
 
-    fluidity: float
-    yield_size: float
-    exponent: float = 1.0
-    hardening: float = 0.0
-    residual_ratio: float = 0.1
+    fluidity: float = parameter("1/s", "fluidity γ", at_least=0.0)
+    exponent: float = parameter("-", "exponent N of the overstress", default=1.0, at_least=1.0)
+    yield_size: float = parameter("Pa", "initial size Y0 of the yield surface, a uniaxial yield stress", above=0.0)
+    hardening: float = parameter("Pa", "H = dY/dε̄, above −E; negative softens", default=0.0)
+    residual_ratio: float = parameter(
+        "-", "softening ends at this share r of Y0", default=0.1, above=0.0, at_most=1.0
+    )
 
     def __post_init__(self):
         super().__post_init__()
-        self._check("fluidity", at_least=0.0)
-        self._check("yield_size", above=0.0)
-        self._check("exponent", at_least=1.0)
         self._check("hardening", above=-self.young_modulus)
-        self._check("residual_ratio", above=0.0, at_most=1.0)
 
     def flow_rate(self, dim: int) -> float:
         """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""

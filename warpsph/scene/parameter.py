@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
 from ..validate import instance, number
+from .material import Elastic
 from .numerics import KERNELS, SOURCE_SCHEMES, Numerics
 from .scheme import SCHEMES
 
@@ -41,6 +42,27 @@ class Parameter:
         for field in ("unit", "meaning"):
             instance(f"Parameter.{field}", getattr(self, field), str, "a text")
         instance(self.name, self.default, float | int | str | None, "a number, True or False, a text or None")
+
+    @classmethod
+    def of(cls, material: Elastic, *names: str) -> tuple[Parameter, ...]:
+        """The parameters of a material, its values the defaults; `material.with_parameters(p)` is the way back.
+
+        Args:
+            material: an example of it.
+            names: which, and in which order; all unless given.
+
+        >>> clay = Elastic(young_modulus=1e6, poisson_ratio=0.4, density=1800.0)
+        >>> Parameter.of(clay, "density")[0].unit, clay.with_parameters(SimpleNamespace(density=1900.0)).density
+        ('kg/m³', 1900.0)
+        """
+        known = {entry.name: entry.metadata for entry in fields(material) if "unit" in entry.metadata}
+        for name in names:
+            if name not in known:
+                raise SceneError("Parameter.of", name, one_of(known, name))
+        return tuple(
+            cls(name, getattr(material, name), known[name]["unit"], known[name]["meaning"])
+            for name in names or known
+        )
 
     def parse(self, text: object) -> float | int | bool | str | None:
         """The value a command line gives."""

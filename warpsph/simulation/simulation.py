@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from typing import Protocol
 
 import numpy as np
@@ -51,7 +52,7 @@ class Simulation:
 
     Attributes:
         scene: the scene.
-        lattice: its initial lattice.
+        mesh: its initial nodes, cells and boundary faces.
         time: simulated time [s].
         steps: number of steps made.
         shortest_step, longest_step: smallest and largest Δt used so far [s].
@@ -59,6 +60,7 @@ class Simulation:
         threads: number of CPU threads.
         nodes, auxiliary, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
+        stepper: makes the steps; for developers, its parts may change from version to version.
 
     Raises:
         SceneError: the device, the precision or the time step is not allowed.
@@ -75,14 +77,13 @@ class Simulation:
         self.precision = precision_of(precision)
         self.device = choose_device(device)
         self.mesh = scene.mesh
-        self._time_step = TimeStep(scene)
+        self._time_step = TimeStep(scene, lambda: self.stepper.lists.shrinkage)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        self._stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
-        body = self._stepper.body
+        self.stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
+        body = self.stepper.body
         self.nodes, self.auxiliary, self.internals = body.nodes, body.auxiliary, body.internals
-        self.conditions = self._stepper.conditions
-        self._time_step.follow(self._stepper.lists.shrinkage)
+        self.conditions = self.stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
 
@@ -141,8 +142,7 @@ class Simulation:
 
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        outcome = self._stepper.advance(times, dt, self._time_step.courant(dt))
-        self._time_step.follow(self._stepper.lists.shrinkage)
+        outcome = self.stepper.advance(times, dt, self._time_step.courant(dt))
         self.steps += outcome.made
         self.time = times[outcome.made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)
@@ -159,8 +159,9 @@ class Simulation:
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:
         """All that the next steps depend on: arrays and numbers by name; see `restore`."""
         own = {name: getattr(self, name) for name in COUNTERS}
-        counted = {**own, "time_step": self._time_step.state(), "stepper": numbers(self._stepper)}
-        return arrays(self._stepper), counted
+        stretch = self._time_step.stretch
+        counted = {**own, "stretch": None if stretch is None else asdict(stretch)}
+        return arrays(self.stepper), counted | {"stepper": numbers(self.stepper)}
 
     def restore(self, state: Mapping[str, np.ndarray], values: Mapping[str, object]) -> None:
         """Go back to what `state` gave, in this simulation or in another one of the same scene and precision.
@@ -168,10 +169,10 @@ class Simulation:
         Raises:
             KeyError: the state is of another scene.
         """
-        restore(self._stepper, state, values["stepper"])
+        restore(self.stepper, state, values["stepper"])
         for name in COUNTERS:
             setattr(self, name, values[name])
-        self._time_step.restore(values["time_step"])
+        self._time_step.stretch = None if values["stretch"] is None else Stretch(**values["stretch"])
 
     def field(self, name: str) -> np.ndarray:
         """A copy of a node field as a NumPy array; see `fields` for the names.
@@ -198,4 +199,4 @@ class Simulation:
     @property
     def list_builds(self) -> int:
         """How often the pair lists were built."""
-        return self._stepper.lists.builds
+        return self.stepper.lists.builds

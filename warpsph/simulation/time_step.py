@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from ..device.precision import PRECISIONS
 from ..errors import SceneError
@@ -54,6 +54,7 @@ class TimeStep:
 
     Args:
         scene: the scene.
+        shrinkage: tells the least present time of a wave from node to node over the initial one, at most 1.
 
     Attributes:
         stretch: the equal steps that are under way, or None.
@@ -62,25 +63,19 @@ class TimeStep:
         SceneError: the Courant number, or the given time step, is beyond the limit of the waves.
     """
 
-    def __init__(self, scene: Scene):
-        mesh, self._numerics = scene.mesh, scene.numerics
-        self._initial_limit = time_step_limit(scene)
-        self._per_spacing = scene.material.wave_speed(mesh.dim) / mesh.smallest_edge()  # [1/s]
-        self._shrinkage = 1.0
+    def __init__(self, scene: Scene, shrinkage: Callable[[], float]):
+        self._initial_limit, self._shrinkage = time_step_limit(scene), shrinkage
+        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.mesh.smallest_edge()  # [1/s]
         self.stretch: Stretch | None = None
 
     @property
     def limit(self) -> float:
         """Largest Δt that is allowed now [s]: less than at the start where nodes are closer, or waves faster."""
-        return self._initial_limit * self._shrinkage
-
-    def follow(self, shrinkage: float) -> None:
-        """The least time of a wave from node to node has become this share of the initial one."""
-        self._shrinkage = shrinkage
+        return self._initial_limit * self._shrinkage()
 
     def courant(self, dt: float) -> float:
         """c_p Δt/Δx of a step, with the least present spacing [-]."""
-        return dt * self._per_spacing / self._shrinkage
+        return dt * self._per_spacing / self._shrinkage()
 
     def begin(self, time: float, end: float, steps: int) -> Stretch:
         """The equal steps to a time [s]: those that a run stopped in, or new ones."""
@@ -95,15 +90,6 @@ class TimeStep:
         if self.stretch.time_step > self.limit * (1.0 + ROUNDING) and time < end:
             self.stretch = self._to(time, end, steps, HEADROOM * self.limit)
         return self.stretch
-
-    def state(self) -> dict[str, object]:
-        """All that the next steps depend on; see `restore`."""
-        return {"shrinkage": self._shrinkage, "stretch": None if self.stretch is None else asdict(self.stretch)}
-
-    def restore(self, state: Mapping[str, object]) -> None:
-        """Go back to what `state` gave."""
-        self._shrinkage = state["shrinkage"]
-        self.stretch = None if state["stretch"] is None else Stretch(**state["stretch"])
 
     @staticmethod
     def _to(time: float, end: float, steps: int, limit: float) -> Stretch:
