@@ -135,7 +135,8 @@ def test_counts_of_a_bar_by_hand():
     assert moved["conditions"] == 2 * point + 8 + row
     assert "sources" not in timing.time_phases(simulation)
     assert counting.memory_per_node(simulation) > point + 3 * 8
-    cells = small(2).stepper._fluxes._cells
+    body, cells = small(2).stepper.body, small(2).stepper.fluxes._cells
+    assert cells.size * 8 == 16 * 22 * 8, "22 numbers of each cell"
     found: dict[int, int] = {}
-    counting._collect_arrays(cells, found, set())
-    assert sum(found.values()) == 16 * 22 * 8 + 25 * 4 * 4, "22 numbers of each cell, four cells a node"
+    counting._collect_arrays(body.node_cells, found, set())
+    assert sum(found.values()) == (25 + 1 + 16 * 4) * 4, "the cells of 25 nodes, as 64 places in compressed rows"
