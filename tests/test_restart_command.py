@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from warpsph.cli.catalogue import load, shipped
+from warpsph.cli.interval import parse_interval
 from warpsph.cli.main import main
-from warpsph.cli.restart import parse_interval
 from warpsph.cli.stored import open_scene, read_toml
 from warpsph.scene.fingerprint import fingerprint
 
