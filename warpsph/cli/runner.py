@@ -19,7 +19,8 @@ from ..scene.output import component
 from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
-from ..simulation.summary import summarise, write_json
+from ..simulation.summary import summarise
+from ..storage.files import write_json
 from .catalogue import SceneFile
 from .progress import Progress
 from .restart import Restart
@@ -183,6 +184,7 @@ def _judge(course: Course) -> Mapping:
             __version__,
             course.error,
             course.stop is not None,
+            course.history.digest,
         )
         write_json(course.folder / SUMMARY, summary)
     return summary

@@ -24,8 +24,7 @@ from ..errors import SceneError, one_of
 from ..mesh.mesh import Mesh
 from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
 from ..simulation.simulation import Simulation
-from ..simulation.summary import write_json
-from ..storage.files import whole
+from ..storage.files import whole, write_json
 from .walls import Wall, walls_of
 
 FOLDER = "frames"

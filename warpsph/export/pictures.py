@@ -15,7 +15,7 @@ from ..errors import SceneError
 from ..simulation.history import read_history
 from ..storage.files import whole
 from .frames import Frame, Frames
-from .plots import BRIGHT, COLOUR_MAP, DARK, DOTS_PER_INCH, axis_label
+from .plots import BRIGHT, COLOUR_MAP, DARK, axis_label, save_picture
 from .quantity import Quantity
 from .view import View
 
@@ -33,7 +33,7 @@ def plot_frame(frames: Frames, quantity: Quantity, frame: Frame, path: Path) -> 
     figure, axes = _single(view)
     view.draw(axes, frame)
     axes.set_title(_title(frames, frame))
-    _save(figure, path)
+    save_picture(figure, path)
 
 
 def animate(frames: Frames, quantity: Quantity, path: Path) -> None:
@@ -72,7 +72,7 @@ def plot_overview(frames: Frames, quantity: Quantity, path: Path) -> None:
         view.draw_grid(view.axes(below, cells[0]), chosen[-1])
     for k, (x, y, reference) in enumerate(reversed(histories)):
         _draw_history(below.add_subplot(cells[-1 - k]), x, y, reference)
-    _save(figure, path)
+    save_picture(figure, path)
 
 
 def _snapshots(view: View, chosen: Sequence[Frame], figure, rows: int, columns: int) -> None:
@@ -105,10 +105,10 @@ def _lines_and_diagram(view: View, frames: Frames, chosen: Sequence[Frame], figu
 
 def _histories(frames: Frames) -> list[tuple]:
     """Up to `HISTORIES` curves, each x and y as (label, values), and a reference (label, value) or None."""
-    try:
-        columns, units = read_history(frames.run / "history.csv")
-    except (OSError, ValueError):
+    path = frames.run / "history.csv"
+    if not path.exists():
         return []
+    columns, units = read_history(path)
     probes = [name for name in columns if name not in ("step", "time")]
 
     def column(name: str) -> tuple[str, np.ndarray]:
@@ -167,7 +167,3 @@ def _new_figure(size: tuple[float, float]) -> Figure:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def _save(figure: Figure, path: Path) -> None:
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
