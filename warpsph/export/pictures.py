@@ -114,6 +114,9 @@ def _histories(frames: Frames) -> list[tuple]:
     def column(name: str) -> tuple[str, np.ndarray]:
         return axis_label(name, units[name]), columns[name]
 
+    for name in frames.about["curve"] or ():
+        if name not in columns:
+            raise SceneError("history", str(path), f"it has no column {name!r}, which about.json says to draw")
     first = frames.about["curve"] or (("time", probes[0]) if probes else None)
     pairs = [tuple(first)] if first else []
     pairs += [("time", name) for name in probes if not first or name not in first]

@@ -52,6 +52,10 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     continuum, about = frames.mesh.continuum, frames.about
     if text is None:
         parts = component_names(about["field"], continuum)
+        if about["component"] >= max(1, len(parts)):
+            raise SceneError(
+                "frames", str(frames.run), f"about.json names a component that {about['field']} lacks"
+            )
         part = parts[about["component"]] if parts else ""
         return Quantity(about["field"], frames.unit(about["field"]), about["component"], part)
     field, colon, part = text.partition(":")

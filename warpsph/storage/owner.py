@@ -11,11 +11,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import socket
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ..errors import SceneError
+from .files import PART
 
 try:
     import fcntl
@@ -69,6 +71,31 @@ def mark(folder: Path) -> None:
     """Say so of a folder that belongs to a file of ours."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).touch()
+
+
+def holds_only(folder: Path, ours: re.Pattern) -> bool:
+    """Whether there is no such folder, or an empty one, or a marked one with files of our names alone."""
+    if not os.path.lexists(folder):
+        return True
+    if folder.is_symlink() or not folder.is_dir():
+        return False
+    names = [path.name for path in folder.iterdir()]
+    known = (ours.fullmatch(name) or PART.fullmatch(name) or name == MARK for name in names)
+    return not names or (marked(folder) and all(known))
+
+
+def empty(folder: Path, ours: re.Pattern) -> None:
+    """Remove a marked folder with the files of our names; what else is in it stays, and it with that."""
+    if not marked(folder):
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        return
+    for path in folder.iterdir():
+        if ours.fullmatch(path.name) or PART.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+    if [path.name for path in folder.iterdir()] == [MARK]:
+        (folder / MARK).unlink()
+        folder.rmdir()
 
 
 @contextlib.contextmanager
