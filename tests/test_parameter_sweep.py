@@ -10,7 +10,8 @@ import time
 import pytest
 
 from warpsph.cli.main import main
-from warpsph.cli.sweep import Member, last_line, members
+from warpsph.cli.member import Member, last_line
+from warpsph.cli.sweep import members
 from warpsph.errors import SceneError
 
 # A bar of ten cells whose end moves; `fault` is what goes wrong, and when.

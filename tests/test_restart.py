@@ -193,12 +193,15 @@ def _again(name):
 
 
 def poison(stepper):
-    """Overwrite every array that the independent look finds."""
+    """Overwrite every array that the independent look finds; tables of indices keep the range they have."""
     found = {}
     holdings(stepper, "", set(), found, as_arrays=True)
     for array in found.values():
         values = array.numpy()
-        array.assign(np.full(values.nbytes, 0x5A, np.uint8).view(values.dtype).reshape(values.shape))
+        if values.dtype.kind in "iu" and values.size and values.min() < values.max():
+            array.assign(values.min() + values.max() - values)
+        else:
+            array.assign(np.full(values.nbytes, 0x5A, np.uint8).view(values.dtype).reshape(values.shape))
     return found
 
 

@@ -87,8 +87,9 @@ def test_run_that_goes_on_keeps_its_frames_and_stage_as_if_it_had_never_stopped(
     assert status == 128 + signal.SIGTERM and 3 < len(Frames("parts")) < 13
     if lost:  # a kill leaves frames that no checkpoint knows
         beyond = Path("parts/frames/000011.npz")
-        np.savez(beyond, time=0.0099, step=0)
-        beyond.with_name(".000012.part.npz").write_bytes(b"torn")
+        with np.load("parts/frames/000002.npz") as frame:
+            np.savez(beyond, **dict(frame) | {"time": 0.0099})
+        beyond.with_name(".000012.999999999-0.part.npz").write_bytes(b"torn")
     monkeypatch.setenv("NO_SIGNAL", "yes")
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")

@@ -1,96 +1,17 @@
-"""What `warpsph run` keeps of a run for later, and the command `warpsph export`."""
+"""The command `warpsph export`."""
 
 from __future__ import annotations
 
 import argparse
-import math
-import sys
-from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
-from typing import TypeVar
 
-from ..errors import SceneError, one_of
-from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
-from ..simulation.simulation import Simulation
+from ..errors import SceneError
+from ..export.frames import Frames
 from ..validate import number
-from .settings import Settings
+from .keeping import USD, kept_frames, target
 
-Made = TypeVar("Made")
-USD = (".usdc", ".usda")
 # Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
 WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
-
-
-def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Simulation], Lenient]]:
-    """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
-    path = _target("--usd", settings.usd, USD) if settings.usd else None
-    if not settings.frames:
-        return [lambda simulation: _NoFrames(simulation, folder)]
-    followers, times = [], evenly(end, settings.frames)
-    if path:
-        from ..export.usd_live import LiveStage  # USD is slow to import
-
-        followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))
-
-    def recorder(simulation: Simulation) -> Lenient:
-        return Lenient(lambda: FrameWriter(simulation, times, folder, followers), "no further frames are kept")
-
-    return [recorder]
-
-
-class _NoFrames:
-    """Keeps no frames; a new run removes those of a former one, which would be taken for its own."""
-
-    next_time = math.inf
-
-    def __init__(self, simulation: Simulation, folder: Path):
-        if not simulation.steps:
-            clear(folder)
-
-    def observe(self, simulation: Simulation) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing."""
-
-
-class Lenient:
-    """An observer, or a follower of frames, that may fail to write: a full disk must not cost the run its result.
-
-    Args:
-        make: makes what it passes on to.
-        lost: what is lost when that fails, for the message.
-    """
-
-    def __init__(self, make: Callable[[], FrameWriter | Follower], lost: str):
-        self._lost, self._works = lost, True
-        self._inner = self._attempt(make)
-
-    @property
-    def next_time(self) -> float:
-        """When the inner observer has to look [s]; never when it has failed."""
-        return self._inner.next_time if self._works else math.inf
-
-    def observe(self, simulation: Simulation) -> None:
-        """Pass on."""
-        self._attempt(lambda: self._inner.observe(simulation))
-
-    def update(self) -> None:
-        """Pass on."""
-        self._attempt(lambda: self._inner.update())
-
-    def close(self) -> None:
-        """Pass on."""
-        self._attempt(lambda: self._inner.close())
-
-    def _attempt(self, task: Callable[[], Made]) -> Made | None:
-        try:
-            return task() if self._works else None
-        except (OSError, RuntimeError) as error:  # USD raises the latter
-            self._works = False
-            print(f"warpsph: {self._lost}, the run goes on ({' '.join(str(error).split())})", file=sys.stderr)
-            return None
 
 
 def add_export(commands) -> None:
@@ -116,7 +37,7 @@ def add_export(commands) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     frames = kept_frames(options.dir)
-    path = _target("FILE", options.file, tuple(WRITERS))
+    path = target("FILE", options.file, tuple(WRITERS))
     writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
     try:
         if path.suffix in USD:
@@ -152,26 +73,3 @@ def _colouring(options: argparse.Namespace, frames: Frames):
     except ValueError:
         raise SceneError("--range", options.range, "it must be LOW,HIGH: two numbers, the second larger") from None
     return Colouring(shown, (low, high), colour_map)
-
-
-def kept_frames(text: str) -> Frames:
-    """The frames of a run's folder, at least one."""
-    frames = Frames(Path(text))
-    if not len(frames):
-        raise SceneError("DIR", text, "it must be the folder of a run that kept frames (`--frames N`)")
-    return frames
-
-
-def _target(option: str, text: str, suffixes: tuple[str, ...]) -> Path:
-    """The path of a file to be written, in a folder that is made if need be."""
-    path = Path(text)
-    if path.suffix not in suffixes:
-        raise SceneError(option, text, one_of([f"NAME{suffix}" for suffix in suffixes]))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.with_name(f".{path.name}.warpsph")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise SceneError(option, text, f"it must be a file that can be written ({error})") from None
-    return path

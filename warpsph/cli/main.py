@@ -7,19 +7,14 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
 from .. import __version__
 from ..errors import SceneError, StoppedError
-from ..simulation.checkpoint import CHECKPOINT, Checkpoint
-from . import new, sweep
+from . import new, sweep_command
 from .catalogue import load, shipped
-from .exporting import add_export, recorders
+from .exporting import add_export
 from .plotting import add_plot
-from .restart import Restart, parse_interval, settings_of
-from .runner import run
-from .settings import add_settings, chosen
-from .stored import SCENE, open_scene
+from .run_command import add_run
 
 # Rooms above this one add their commands by these modules: a name, since imports point down.
 FURTHER = ("warpsph.report.command",)
@@ -58,19 +53,8 @@ def _parser() -> argparse.ArgumentParser:
     listing.add_argument("scene", nargs="?", help="a shipped scene or the path of a scene file")
     listing.set_defaults(command=_list)
 
-    running = commands.add_parser("run", help="run a scene and judge it")
-    running.add_argument("scene", nargs="?", help="a shipped scene, or the path of a scene file or a scene.toml")
-    running.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="set a parameter; may be repeated"
-    )
-    running.add_argument("--out", metavar="DIR", help="folder for the results (default: runs/SCENE)")
-    running.add_argument("--quiet", action="store_true", help="print nothing unless something fails")
-    running.add_argument(
-        "--resume", metavar="DIR", help="go on from the checkpoint in DIR, a run's folder, with its options"
-    )
-    add_settings(running)
-    running.set_defaults(command=_run, usage_error=running.error)
-    sweep.add_parser(commands)
+    add_run(commands)
+    sweep_command.add_parser(commands)
     new.add_parser(commands)
 
     add_plot(commands)
@@ -94,37 +78,6 @@ def _list(options: argparse.Namespace) -> int:
     for row in rows:
         print("  ".join(cell.ljust(w) for cell, w in zip(row, [*widths, 0], strict=True)).rstrip())
     return 0
-
-
-def _run(options: argparse.Namespace) -> int:
-    if options.scene is None and options.resume is None:
-        options.usage_error("the following arguments are required: SCENE, or --resume DIR")
-    checkpoint = None if options.resume is None else _checkpoint(Path(options.resume), options.out)
-    file = open_scene(options.scene or str(Path(options.resume) / SCENE))
-    settings = chosen(options, file.settings if checkpoint is None else settings_of(checkpoint))
-    scene, values = file.build(options.set)
-    folder = Path(options.out or options.resume or Path("runs") / file.name)
-    end = scene.duration if settings.until is None else settings.until
-    passed = run(
-        file,
-        scene,
-        values,
-        settings,
-        folder,
-        quiet=options.quiet,
-        watching=recorders(settings, folder, end),
-        restart=Restart(parse_interval(settings.checkpoint_every), checkpoint),
-    )
-    return 0 if passed else 1
-
-
-def _checkpoint(folder: Path, out: str | None) -> Checkpoint:
-    if out is not None and Path(out).resolve() != folder.resolve():
-        raise SceneError("--out", out, f"a run goes on in its own folder, {folder}; to branch off, copy that")
-    if (folder / SCENE).is_file() and not (folder / CHECKPOINT).exists():
-        again = f"warpsph run {folder / SCENE} --out {folder}"
-        raise SceneError("--resume", str(folder), f"it has no checkpoint yet; start again with: {again}")
-    return Checkpoint.read(folder / CHECKPOINT)
 
 
 if __name__ == "__main__":

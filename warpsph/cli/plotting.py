@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import SceneError, one_of
 from ..validate import number
-from .exporting import kept_frames
+from .keeping import kept_frames
 
 MOVIES = ("gif", "mp4")
 

@@ -1,23 +1,18 @@
-"""Checkpoints from the command line: when to write them, how to go on from one, and what signals do."""
+"""How a run goes on from a checkpoint and writes new ones."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-import re
-import signal
-import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import SceneError, StoppedError
 from ..simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, Interval
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
 from .settings import Settings
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+from .stopping import Stopper, handled
 
 
 @dataclass(frozen=True)
@@ -61,17 +56,9 @@ class Restart:
             yield _Nothing()
             return
         checkpoints = Checkpoints(simulation, history, folder / CHECKPOINT, self.interval, settings.table())
-        stopper = _Stopper(checkpoints, folder)
-        previous = {}
-        if threading.current_thread() is threading.main_thread():
-            for each in SIGNALS:
-                if signal.getsignal(each) is not signal.SIG_IGN:  # a worker leaves interrupts to its parent
-                    previous[each] = signal.signal(each, stopper.ask)
-        try:
+        stopper = Stopper(checkpoints, folder)
+        with handled(stopper.ask):
             yield stopper
-        finally:
-            for each, handler in previous.items():
-                signal.signal(each, handler)
 
 
 class _Nothing:
@@ -81,52 +68,9 @@ class _Nothing:
         """Nothing."""
 
 
-class _Stopper:
-    def __init__(self, checkpoints: Checkpoints, folder: Path):
-        self._checkpoints, self._folder, self._asked = checkpoints, folder, None
-
-    @property
-    def next_time(self) -> float:
-        return self._checkpoints.next_time
-
-    def ask(self, number: int, frame: object) -> None:
-        if self._asked is not None:
-            raise KeyboardInterrupt
-        self._asked = number
-
-    def observe(self, simulation: Simulation) -> None:
-        if self._asked is None:
-            self._checkpoints.observe(simulation)
-            return
-        written = self._checkpoints.write(simulation)
-        then = f"go on with: warpsph run --resume {self._folder}" if written else "without a checkpoint"
-        raise StoppedError(
-            f"stopped after step {simulation.steps}, t = {simulation.time:.6g} s; {then}", self._asked
-        )
-
-
 def settings_of(checkpoint: Checkpoint) -> Settings:
     """How the run was made that left a checkpoint."""
     header = checkpoint.header
-    leg = header["values"]["leg"] or {}
-    found = {"device": header["device"], "precision": header["precision"], "until": leg.get("end")}
+    stretch = header["values"]["stretch"] or {}
+    found = {"device": header["device"], "precision": header["precision"], "until": stretch.get("end")}
     return Settings.read({name: value for name, value in (found | header["run"]).items() if value is not None})
-
-
-def parse_interval(text: str) -> Interval:
-    """How often, from a text such as 500, 0.2s, 10min or 1h.
-
-    >>> parse_interval("500").steps, parse_interval("0.2s").time, parse_interval("1.5h").seconds
-    (500, 0.2, 5400.0)
-    """
-    found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(s|min|h|)\s*", text, re.IGNORECASE)
-    allowed = "it must be a number of steps (500), a simulated time (0.2s) or a wall time (10min, 1h), above 0"
-    try:
-        amount, unit = float(found[1]), found[2].lower()
-    except (TypeError, ValueError):
-        amount, unit = math.nan, ""
-    if not 0.0 < amount < math.inf or (not unit and amount != int(amount)):
-        raise SceneError("--checkpoint-every", text, allowed)
-    if unit == "s":
-        return Interval(time=amount)
-    return Interval(seconds=amount * {"min": 60.0, "h": 3600.0}[unit]) if unit else Interval(steps=int(amount))

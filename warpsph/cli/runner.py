@@ -1,11 +1,11 @@
-"""Runs one scene file: progress, history, checks, pictures, summary."""
+"""Runs one scene file from end to end: it is prepared, advanced, judged, drawn and told."""
 
 from __future__ import annotations
 
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Protocol
@@ -20,15 +20,16 @@ from ..scene.output import component
 from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
-from ..simulation.summary import summarise, write_json
+from ..simulation.summary import summarise
+from ..storage.files import write_json
 from .catalogue import SceneFile
 from .progress import Progress
 from .restart import Restart
 from .settings import Settings
 from .stored import StoredScene, store
 
-SUMMARY = "summary.json"
-PICTURES = ("history.png", "field.png", "surface.png")
+SUMMARY, HISTORY = "summary.json", "history.csv"
+HISTORY_PICTURE, FIELD_PICTURE, SURFACE_PICTURE = PICTURES = ("history.png", "field.png", "surface.png")
 
 
 class ClosingObserver(Observer, Protocol):
@@ -36,6 +37,54 @@ class ClosingObserver(Observer, Protocol):
 
     def close(self) -> None:
         """Finish."""
+
+
+@dataclass
+class Course:
+    """A run on its way.
+
+    Attributes:
+        file: the scene's file.
+        simulation: the simulation.
+        parameters: of the scene, name → value.
+        settings: how it is run.
+        folder: its results.
+        history: its probes; None before it begins.
+        error: why it broke down, or None.
+        stop: what asked it to stop, or None.
+        wall_time: how long it took so far [s].
+    """
+
+    file: SceneFile | StoredScene
+    simulation: Simulation
+    parameters: Mapping[str, object]
+    settings: Settings
+    folder: Path
+    history: History | None = None
+    error: str | None = None
+    stop: StoppedError | None = None
+    wall_time: float = 0.0
+    checks: list[Check] = field(default_factory=list)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.simulation.scene
+
+    @property
+    def end(self) -> float:
+        """Simulated time at which it ends [s]."""
+        return self.scene.duration if self.settings.until is None else self.settings.until
+
+    @property
+    def finished(self) -> bool:
+        """Whether it has reached the scene's duration, where its checks count."""
+        return self.error is None and self.simulation.time >= self.scene.duration * (1.0 - 1e-9)
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing speaks against it."""
+        return self.error is None and all(check.passed for check in self.checks)
 
 
 def run(
@@ -58,12 +107,24 @@ def run(
         StoppedError: a signal asked the run to stop; summary and pictures show what there is.
     """
     say = (lambda text: None) if quiet else print
+    restart = Restart() if restart is None else restart
+    course = _prepare(file, scene, parameters, settings, folder, restart, say)
+    _advance(course, restart, watching, show=not quiet and sys.stderr.isatty())
+    summary = _judge(course)
+    pictures = _draw(course)
+    _tell(course, summary, pictures, quiet, say)
+    if course.stop is not None:
+        raise course.stop
+    return course.passed
+
+
+def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
+    """The simulation where it begins, and a folder that is ready for its results."""
     start = clock.perf_counter()
     simulation = Simulation(scene, device=settings.device, precision=settings.precision, threads=settings.threads)
     settings = replace(settings, device=simulation.device.alias)
     component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
     folder = writable(folder)
-    restart = Restart() if restart is None else restart
     restart.begin(simulation, folder)
     for name in (SUMMARY, *PICTURES):
         (folder / name).unlink(missing_ok=True)  # a former run's would be taken for this one's
@@ -76,57 +137,89 @@ def run(
     )
     if simulation.steps:
         say(f"goes on from step {simulation.steps}, t = {simulation.time:.6g} s")
-    end = scene.duration if settings.until is None else settings.until
-    with file.errors_located():
-        history = History(simulation, folder / "history.csv", restart.history)
-    progress = Progress(simulation, end, show=not quiet and sys.stderr.isatty())
-    observers = [history, progress, *(watch(simulation) for watch in watching)]
-    begin, error, stop = clock.perf_counter(), None, None
+    return Course(file, simulation, parameters, settings, folder)
+
+
+def _advance(course: Course, restart: Restart, watching: Sequence[Callable], show: bool) -> None:
+    """Take the run to its end, or to where something ends it."""
+    simulation = course.simulation
+    with course.file.errors_located():
+        course.history = History(simulation, course.folder / HISTORY, restart.history)
+    progress = Progress(simulation, course.end, show)
+    observers = [course.history, progress, *(watch(simulation) for watch in watching)]
+    begin = clock.perf_counter()
     try:
-        with file.errors_located(), restart.watching(simulation, history, folder, settings) as checkpoints:
-            simulation.run(until=end, observers=[*observers, checkpoints])
-            history.sample(simulation)
+        with (
+            course.file.errors_located(),
+            restart.watching(simulation, course.history, course.folder, course.settings) as checkpoints,
+        ):
+            simulation.run(until=course.end, observers=[*observers, checkpoints])
+            course.history.sample(simulation)
     except NonFiniteError as failure:
-        error = str(failure)
+        course.error = str(failure)
     except StoppedError as asked:
-        stop = asked
+        course.stop = asked
     finally:
         for observer in observers:
             observer.close()
-    wall_time = clock.perf_counter() - begin + restart.wall_time
-    checks: list[Check] = []
-    finished = error is None and simulation.time >= scene.duration * (1.0 - 1e-9)
+    course.wall_time = clock.perf_counter() - begin + restart.wall_time
+
+
+def _judge(course: Course) -> Mapping:
+    """Make the checks of a run that has finished, and write its summary also when they fail to work."""
     try:
-        if finished:
+        if course.finished:
             outcome = SimpleNamespace(
-                simulation=simulation, scene=scene, history=history, parameters=SimpleNamespace(**parameters)
+                simulation=course.simulation,
+                scene=course.scene,
+                history=course.history,
+                parameters=SimpleNamespace(**course.parameters),
             )
-            checks = file.checks(outcome)
-    finally:  # the run keeps its summary when its checks fail to work
-        summary = summarise(simulation, parameters, checks, wall_time, __version__, error, stop is not None)
-        write_json(folder / SUMMARY, summary)
-    drawn = [plot_history(simulation, history, folder / PICTURES[0])]
-    if error is None:
-        plot_field(simulation, folder / PICTURES[1])
-        drawn += [True, plot_surface(simulation, folder / PICTURES[2])]
-    pictures = [name for name, there in zip(PICTURES, drawn, strict=False) if there]
+            course.checks = course.file.checks(outcome)
+    finally:
+        summary = summarise(
+            course.simulation,
+            course.parameters,
+            course.checks,
+            course.wall_time,
+            __version__,
+            course.error,
+            course.stop is not None,
+            course.history.digest,
+        )
+        write_json(course.folder / SUMMARY, summary)
+    return summary
+
+
+def _draw(course: Course) -> list[str]:
+    """Draw what can be drawn; the names of the pictures."""
+    simulation, folder, drawn = course.simulation, course.folder, []
+    if plot_history(simulation, course.history, folder / HISTORY_PICTURE):
+        drawn.append(HISTORY_PICTURE)
+    if course.error is None:
+        plot_field(simulation, folder / FIELD_PICTURE)
+        drawn.append(FIELD_PICTURE)
+        if plot_surface(simulation, folder / SURFACE_PICTURE):
+            drawn.append(SURFACE_PICTURE)
+    return drawn
+
+
+def _tell(course: Course, summary: Mapping, pictures: list[str], quiet: bool, say: Callable[[str], None]) -> None:
+    """Say how it went and where the results are."""
+    simulation, folder = course.simulation, course.folder
     say(
-        f"{simulation.steps} steps to t = {simulation.time:.6g} s in {wall_time:.1f} s, "
+        f"{simulation.steps} steps to t = {simulation.time:.6g} s in {course.wall_time:.1f} s, "
         f"{summary['node_steps_per_second']:.3g} node-steps/s"
     )
-    if error:
-        print(f"warpsph: {error}", file=sys.stderr)
-    elif not finished and stop is None:
-        say(f"checks skipped: they need the whole duration of {scene.duration:g} s")
-    passed = error is None and all(check.passed for check in checks)
-    if checks and not (quiet and passed):
-        print(table(checks))
-    say(f"results in {folder}/: {', '.join([SUMMARY, 'history.csv', 'scene.toml', *pictures])}")
-    if settings.frames:
+    if course.error:
+        print(f"warpsph: {course.error}", file=sys.stderr)
+    elif not course.finished and course.stop is None:
+        say(f"checks skipped: they need the whole duration of {course.scene.duration:g} s")
+    if course.checks and not (quiet and course.passed):
+        print(table(course.checks))
+    say(f"results in {folder}/: {', '.join([SUMMARY, HISTORY, 'scene.toml', *pictures])}")
+    if course.settings.frames:
         say(f"all times on one sheet: warpsph plot {folder}")
-    if stop is not None:
-        raise stop
-    return passed
 
 
 def table(checks: Sequence[Check]) -> str:

@@ -1,22 +1,15 @@
 """The frame store: whole fields of a run at chosen times, in a folder that pictures and exports read.
 
-    frames/about.json     the scene's name, the times asked for, the walls, what is drawn
-    frames/body.npz       the initial lattice
-    frames/000012.npz     time, step and the fields (float32) at the first step at or after the 12th time
-
-Every file is written under another name and renamed, so that a run that dies leaves whole frames only.
+Every file is written whole, so that a run that dies leaves whole frames only; `frame_files` says what is in them.
 """
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -25,11 +18,23 @@ from ..errors import SceneError, one_of
 from ..mesh.mesh import Mesh
 from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
-from ..simulation.summary import write_json
-from ..storage.files import whole
+from ..storage.files import write_json
+from .frame_files import (
+    ABOUT,
+    BODY,
+    FOLDER,
+    ROUNDING,
+    clear,
+    clear_after,
+    frame_path,
+    frame_paths,
+    read_about,
+    read_body,
+    read_frame,
+    save_arrays,
+)
 from .walls import Wall, walls_of
 
-FOLDER = "frames"
 STORED = ("displacement", "velocity", "stress", "density", "free_surface")  # and the internal variables
 # Fields that follow from the stored ones; displacement is stored since float32 can not hold it in a position.
 DERIVED = {
@@ -38,24 +43,6 @@ DERIVED = {
     "von_mises_stress": lambda frame: von_mises(frame.field("stress"), frame.mesh.continuum),
     "mean_stress": lambda frame: mean_stress(frame.field("stress"), frame.mesh.continuum),
 }
-FRAME_FILE = re.compile(r"\d{6}\.npz|\.\d{6}\.part\.npz")
-ROUNDING = 1e-9
-
-
-def clear(run: Path, after: float = -1.0) -> None:
-    """Remove the frames of a run folder that are later than a time [s]; all of them unless given."""
-    folder = run / FOLDER
-    if not folder.is_dir():
-        return
-    for path in folder.iterdir():
-        if FRAME_FILE.fullmatch(path.name) and (after < 0.0 or not _earlier(path, after)):
-            path.unlink()
-    if after < 0.0:
-        (folder / "about.json").unlink(missing_ok=True)
-
-
-def _earlier(path: Path, time: float) -> bool:
-    return path.name[0] != "." and float(_load(path)["time"]) <= time * (1.0 + ROUNDING)
 
 
 class Follower(Protocol):
@@ -87,10 +74,8 @@ class FrameWriter:
         run: Path | str,
         followers: Sequence[Callable[[Frames], Follower]] = (),
     ):
-        run = Path(run)
-        self._folder = run / FOLDER
-        former = _about(run) if simulation.steps else None
-        clear(run, simulation.time if former else -1.0)
+        self._run = run = Path(run)
+        former = clear_after(run, simulation.time) if simulation.steps else clear(run)
         times, rate = [float(time) for time in times], _rate(times)
         if former:
             kept = [time for time in former["times"] if time <= simulation.time * (1.0 + ROUNDING)]
@@ -104,7 +89,7 @@ class FrameWriter:
         if simulation.scene.output.field not in (*names, *DERIVED):
             names.append(simulation.scene.output.field)
         self._fields = {name: own[name].unit for name in names}
-        self._folder.mkdir(parents=True, exist_ok=True)
+        (run / FOLDER).mkdir(parents=True, exist_ok=True)
         self._describe(simulation, rate)
         self.next_time, self._followers = -1.0, ()
         self.observe(simulation)
@@ -113,7 +98,7 @@ class FrameWriter:
     def _describe(self, simulation: Simulation, rate: float) -> None:
         mesh, output, walls = simulation.mesh, simulation.scene.output, walls_of(simulation.scene)
         parts = {name: getattr(mesh, name) for name in Mesh.__dataclass_fields__}
-        _save(self._folder / "body.npz", parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
+        save_arrays(self._run / FOLDER / BODY, parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
         about = {
             "scene": simulation.scene.name,
             "times": self._times.tolist(),
@@ -125,7 +110,7 @@ class FrameWriter:
             "curve_reference": output.curve_reference,
             "walls": [{"name": wall.name, "still": wall.still} for wall in walls],
         }
-        write_json(self._folder / "about.json", about)
+        write_json(self._run / FOLDER / ABOUT, about)
 
     def observe(self, simulation: Simulation) -> None:
         """Write a frame when its time has come."""
@@ -133,10 +118,10 @@ class FrameWriter:
             return
         passed = int(np.searchsorted(self._times, simulation.time * (1.0 + ROUNDING), side="right"))
         self.next_time = self._times[passed] * (1.0 - ROUNDING) if passed < len(self._times) else float("inf")
-        path = self._folder / f"{passed - 1:06d}.npz"
+        path = frame_path(self._run, passed - 1)
         if passed and not path.exists():
             fields = {name: simulation.field(name).astype(np.float32) for name in self._fields}
-            _save(path, {"time": simulation.time, "step": simulation.steps} | fields)
+            save_arrays(path, {"time": simulation.time, "step": simulation.steps} | fields)
             for follower in self._followers:
                 follower.update()
 
@@ -197,28 +182,25 @@ class Frames(Sequence):
 
     def __init__(self, run: Path | str):
         self.run = Path(run)
-        self.about = _about(self.run)
+        self.about = read_about(self.run)
         if self.about is None:
             raise SceneError("DIR", str(run), "it must be the folder of a run that kept frames (`--frames N`)")
         self.times, self.rate = tuple(self.about["times"]), self.about["rate"]
 
     @cached_property
-    def _body(self) -> Mapping[str, np.ndarray]:
-        return _load(self.run / FOLDER / "body.npz")
+    def _body(self) -> tuple[Mesh, list[np.ndarray]]:
+        return read_body(self.run, len(self.about["walls"]))
 
-    @cached_property
+    @property
     def mesh(self) -> Mesh:
-        """The initial mesh."""
-        parts = {name: self._body[name] for name in Mesh.__dataclass_fields__}
-        return Mesh(**parts | {"spacing": float(parts["spacing"])})
+        """The initial lattice."""
+        return self._body[0]
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:
         """What surrounds the body."""
-        return tuple(
-            Wall(wall["name"], self._body[f"wall_{k}"], wall["still"])
-            for k, wall in enumerate(self.about["walls"])
-        )
+        walls = zip(self.about["walls"], self._body[1], strict=True)
+        return tuple(Wall(wall["name"], faces, wall["still"]) for wall, faces in walls)
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -234,7 +216,10 @@ class Frames(Sequence):
     @property
     def numbers(self) -> list[int]:
         """Numbers of the frames there are now, also while the run goes on."""
-        return sorted(int(path.stem) for path in (self.run / FOLDER).glob("[0-9]" * 6 + ".npz"))
+        found = [int(path.stem) for path in frame_paths(self.run)]
+        if found and found[-1] >= len(self.times):
+            raise SceneError("frame", str(frame_path(self.run, found[-1])), "about.json knows of no such time")
+        return found
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -247,7 +232,7 @@ class Frames(Sequence):
 
     def read(self, number: int) -> Frame:
         """The frame of that number."""
-        stored = _load(self.run / FOLDER / f"{number:06d}.npz")
+        stored = read_frame(frame_path(self.run, number), self.about["fields"], self.mesh)
         time, step = float(stored.pop("time")), int(stored.pop("step"))
         return Frame(number, time, step, self.mesh, stored)
 
@@ -272,23 +257,3 @@ def evenly(end: float, count: int) -> np.ndarray:
 
 def _rate(times: Sequence[float]) -> float:
     return (len(times) - 1) / float(times[-1]) if len(times) > 1 else 1.0
-
-
-def _about(run: Path) -> dict | None:
-    try:
-        return json.loads((run / FOLDER / "about.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-
-
-def _save(path: Path, arrays: Mapping[str, object]) -> None:
-    with whole(path) as temporary:
-        np.savez(temporary, **arrays)
-
-
-def _load(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path) as file:
-            return dict(file)
-    except (OSError, ValueError, BadZipFile) as error:
-        raise SceneError("frame", str(path), f"it can not be read ({error}); delete it") from None

@@ -6,7 +6,8 @@ VTK itself, an optional extra.
 
 from __future__ import annotations
 
-import shutil
+import errno
+import re
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,11 +17,13 @@ import numpy as np
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
 from ..storage.files import whole
+from ..storage.owner import empty, holds_only, mark
 from .frames import Frame, Frames
 from .vectors import in_space
 
 # Stored components in VTK's order of a symmetric tensor.
 TENSOR = {(0, 0): 0, (1, 1): 1, (2, 2): 2, (0, 1): 3, (1, 2): 4, (0, 2): 5}
+FRAME = re.compile(r"\d{6}\.vtp")
 COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
@@ -36,19 +39,32 @@ def _vtk():
 
 
 def write_series(frames: Frames, path: Path) -> None:
-    """Write `NAME.pvd` and, in `NAME_frames/`, a `.vtp` a frame; the `.pvd` comes last and whole."""
+    """Write `NAME.pvd` and, in `NAME_frames/`, a `.vtp` a frame.
+
+    The frames are made beside those of a former export, then take their place; a `.pvd` that stands at any moment
+    stands with all its frames.
+
+    Raises:
+        SceneError: a folder `NAME_frames` is there that holds what no export has written.
+    """
     _vtk()
     folder = path.with_name(f"{path.stem}_frames")
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    if not holds_only(folder, FRAME):
+        raise SceneError("FILE", str(path), f"{folder} holds what no export has written; choose another name")
+    fresh = path.with_name(f".{folder.name}.new")
+    empty(fresh, FRAME)
+    mark(fresh)
     root = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     collection = ElementTree.SubElement(root, "Collection")
     for frame in frames:
-        file = folder / f"{frame.number:06d}.vtp"
+        file = fresh / f"{frame.number:06d}.vtp"
         _write(_body(frame, frames.fields), file)
         part = {"timestep": repr(frame.time), "part": "0", "file": f"{folder.name}/{file.name}"}
         ElementTree.SubElement(collection, "DataSet", part)
     ElementTree.indent(root)
+    path.unlink(missing_ok=True)
+    empty(folder, FRAME)
+    fresh.rename(folder)
     with whole(path) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
@@ -107,7 +123,8 @@ def _array(name: str, values: np.ndarray, mesh: Mesh):
 
 def _write(body, path: Path) -> None:
     writer = _vtk()[2].vtkXMLPolyDataWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(body)
-    if not writer.Write():
-        raise OSError(f"VTK can not write {path}")
+    with whole(path) as temporary:
+        writer.SetFileName(str(temporary))
+        writer.SetInputData(body)
+        if not writer.Write() or writer.GetErrorCode():
+            raise OSError(errno.EIO, "VTK can not write it", str(path))

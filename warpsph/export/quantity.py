@@ -65,7 +65,10 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     continuum = frames.mesh.continuum
     if text is None:
         field, component = frames.about["field"], frames.about["component"]
-        return _component(field, frames.unit(field), component, component_names(field, continuum))
+        parts = component_names(field, continuum)
+        if component >= max(1, len(parts)):
+            raise SceneError("frames", str(frames.run), f"about.json names a component that {field} lacks")
+        return _component(field, frames.unit(field), component, parts)
     field, colon, part = text.partition(":")
     if field not in frames.fields:
         raise SceneError("--field", text, one_of(frames.fields, field))

@@ -11,11 +11,13 @@ of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import errno
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, Vt
 
 from .. import __version__
 from ..simulation.fields import component_names
@@ -39,7 +41,7 @@ def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) 
     if colouring is None:
         shown = quantity(None, frames)
         colouring = Colouring(shown, whole_span(shown, frames))
-    with whole(path) as temporary:
+    with usd_errors(path), whole(path) as temporary:
         stage = Usd.Stage.CreateNew(str(temporary))
         drawing = Drawing(stage, frames, colouring)
         drawing.describe()
@@ -49,6 +51,22 @@ def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) 
                 stage.Save()  # appends: what is in the file leaves the memory
         drawing.span_time(frames.codes)
         stage.Save()
+        check_written(temporary)
+
+
+@contextlib.contextmanager
+def usd_errors(path: Path) -> Iterator[None]:
+    """Turn USD's errors into an `OSError`: of a file that can not be written they are."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        raise OSError(errno.EIO, " ".join(str(error).split())[:300], str(path)) from None
+
+
+def check_written(path: Path) -> None:
+    """Refuse a file that the disk has not taken as a whole: USD does not always say so."""
+    if Sdf.Layer.OpenAsAnonymous(str(path)) is None:
+        raise OSError(errno.EIO, "it is not as it was written", str(path))
 
 
 class Drawing:

@@ -7,27 +7,35 @@ one flattened stage takes its place and the folder goes. A frame costs the same 
 
 from __future__ import annotations
 
-import shutil
+import re
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, Vt
 
-from ..storage.files import whole
+from ..errors import SceneError
+from ..storage.files import remove_parts, whole
+from ..storage.owner import empty, holds_only, mark
 from .colours import Colouring, percentiles, span_of
 from .frames import Frames
 from .quantity import quantity
-from .usd import ROOT, Drawing, write_stage
+from .usd import ROOT, Drawing, check_written, usd_errors, write_stage
+
+CLIP = re.compile(r"\d+-\d{6}\.usdc")
 
 
 class LiveStage:
     """Keeps a USD file up to date with the frames of a run.
 
-    Until the run ends a frame is coloured by the range of what is known so far.
+    Until the run ends a frame is coloured by the range of what is known so far. The files of a former one stay
+    until a new stage refers to new ones.
 
     Args:
         frames: the frames, which another observer writes.
         path: of the USD file.
+
+    Raises:
+        SceneError: a folder of the clips' name is there that holds what no run has written.
     """
 
     def __init__(self, frames: Frames, path: Path):
@@ -36,9 +44,16 @@ class LiveStage:
         self._shown = quantity(None, frames)
         self._ranges: list[np.ndarray] = []
         self._seen: list[int] = []
-        shutil.rmtree(self._folder, ignore_errors=True)
-        self._folder.mkdir(parents=True)
+        if not holds_only(self._folder, CLIP):
+            allowed = f"{self._folder} holds what no run has written; choose another name"
+            raise SceneError("--usd", str(path), allowed)
+        mark(self._folder)
+        former = [path for path in self._folder.iterdir() if CLIP.fullmatch(path.name)]
+        self._generation = 1 + max((int(path.name.partition("-")[0]) for path in former), default=0)
         self.update()
+        for path in former:
+            path.unlink(missing_ok=True)
+        remove_parts(self._folder)
 
     def update(self) -> None:
         """Add the frames that are new."""
@@ -46,13 +61,19 @@ class LiveStage:
         for number in new:
             frame = self._frames.read(number)
             self._ranges.append(percentiles(self._shown(frame)))
-            clip = Usd.Stage.CreateNew(str(self._folder / f"{number:06d}.usdc"))
-            drawing = Drawing(clip, self._frames, self._colouring)
-            drawing.add(frame)
-            clip.Save()
+            path = self._folder / self._clip(number)
+            with usd_errors(path), whole(path) as temporary:
+                clip = Usd.Stage.CreateNew(str(temporary))
+                drawing = Drawing(clip, self._frames, self._colouring)
+                drawing.add(frame)
+                clip.Save()
+                check_written(temporary)
             self._seen.append(number)
         if new:
             self._refer()
+
+    def _clip(self, number: int) -> str:
+        return f"{self._generation}-{number:06d}.usdc"
 
     @property
     def _colouring(self) -> Colouring:
@@ -65,7 +86,7 @@ class LiveStage:
         drawing.describe()
         codes = [self._frames.code(number) for number in self._seen]
         drawing.span_time(codes)
-        paths = [f"./{self._folder.name}/{number:06d}.usdc" for number in self._seen]
+        paths = [f"./{self._folder.name}/{self._clip(number)}" for number in self._seen]
         clips = {
             "assetPaths": Sdf.AssetPathArray([Sdf.AssetPath(path) for path in paths]),
             "manifestAssetPath": Sdf.AssetPath(paths[0]),
@@ -75,10 +96,11 @@ class LiveStage:
         }
         layer = stage.GetRootLayer()
         layer.GetPrimAtPath(ROOT).SetInfo("clips", {"default": clips})
-        with whole(self._path) as temporary:
+        with usd_errors(self._path), whole(self._path) as temporary:
             layer.Export(str(temporary))
+            check_written(temporary)
 
     def close(self) -> None:
         """Put one flattened stage in the place of all."""
         write_stage(self._frames, self._path)
-        shutil.rmtree(self._folder, ignore_errors=True)
+        empty(self._folder, CLIP)

@@ -18,7 +18,7 @@ def fingerprint(scene: Scene) -> str:
     """SHA-256 of the resolved scene as hexadecimal digits.
 
     Nodes, cells, resolved conditions, initial fields, material, numerics, loads and the history's columns count;
-    names, pictures and checks do not.
+    names, pictures and checks do not. What the probes compute is in `Scene.probe_identities`.
     """
     digest = hashlib.sha256()
     for name, value in _parts(scene):

@@ -20,6 +20,7 @@ from ..validate import (
     time_function,
     vector,
 )
+from .code import identity
 from .condition import Condition, Free
 from .free_surface import FreeSurface
 from .material import Elastic
@@ -166,6 +167,11 @@ class Scene:
     def initial_stress(self) -> np.ndarray:
         """[Pa], shape (n, s)."""
         return self._initial("stress", self.stress, self.mesh.continuum.stress_size)
+
+    @cached_property
+    def probe_identities(self) -> dict[str, str]:
+        """What each probe computes, by its name, as it was when this was asked first: functions may keep notes."""
+        return {probe.name: identity(probe.function) for probe in self.output.probes}
 
     def _initial(self, name: str, function: Callable | None, size: int) -> np.ndarray:
         if function is None:

@@ -17,11 +17,14 @@ from .. import __version__
 from ..errors import SceneError
 from ..scene.fingerprint import fingerprint
 from ..storage.files import write_whole
+from ..storage.reading import check_array, digest, read_arrays, reading, require
 from .history import History
-from .simulation import Simulation
+from .simulation import COUNTERS, Simulation
+from .time_step import Stretch
 
 CHECKPOINT = "checkpoint.npz"
 STATE, HISTORY = "state/", "history/"
+PYTHON = f"Python {sys.version_info[0]}.{sys.version_info[1]}"
 
 
 @dataclass(frozen=True)
@@ -57,27 +60,33 @@ class Checkpoint:
 
     @staticmethod
     def read(path: Path | str) -> Checkpoint:
-        """Read a checkpoint.
+        """Read a checkpoint; every byte of it is checked.
 
         Raises:
             SceneError: there is none, it is damaged, or another version wrote it.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                content = {name: file[name] for name in file.files}
+        path = Path(path)
+        if not path.exists():
+            raise SceneError("checkpoint", str(path), "there is no checkpoint (No such file or directory)")
+        damaged = "it is damaged or no checkpoint ({error})"
+        content = read_arrays("checkpoint", path, damaged)
+        with reading("checkpoint", path, damaged):
             header = json.loads(content.pop("header").tobytes())
-        except OSError as error:
-            raise SceneError("checkpoint", str(path), f"there is no checkpoint ({error.strerror})") from None
-        except Exception as error:  # reading damaged bytes may raise anything
-            raise SceneError("checkpoint", str(path), f"it is damaged or no checkpoint ({error})") from None
+            require(isinstance(header, dict) and isinstance(header.get("version"), str), "its header is not ours")
         if header["version"] != __version__:
             allowed = f"it is of warpsph {header['version']}, this is {__version__}"
             raise SceneError("checkpoint", str(path), allowed)
-        parts = (
+        with reading("checkpoint", path, damaged):
+            _check_header(header)
+            require(header["content"] == digest(content), "its arrays are not those that were written")
+        state, history = (
             {name.removeprefix(part): value for name, value in content.items() if name.startswith(part)}
             for part in (STATE, HISTORY)
         )
-        return Checkpoint(Path(path), header, *parts)
+        with reading("checkpoint", path, damaged):
+            check_array("rows", history["rows"], shape=(None, None), finite=False) if history else None
+            require(not history or history["next"].shape == (), "its history is of another form")
+        return Checkpoint(path, header, state, history)
 
     def restore(self, simulation: Simulation) -> None:
         """Bring a new simulation of the same scene to where this one was.
@@ -91,10 +100,33 @@ class Checkpoint:
         if self.header["scene"] != fingerprint(simulation.scene):
             allowed = f"it is of another scene, or of other parameters, than {simulation.scene.name} now has"
             raise SceneError("checkpoint", str(self.path), allowed)
-        try:
+        for name, identity in simulation.scene.probe_identities.items():
+            if self.header["probes"].get(name) != identity:
+                why = "" if self.header["python"] == PYTHON else f", or was compiled by {self.header['python']}"
+                allowed = f"it was recorded with another function of the probe {name!r}{why}; start again"
+                raise SceneError("checkpoint", str(self.path), allowed)
+        with reading("checkpoint", self.path, "it holds another state ({error})"):
+            columns = 2 + len(simulation.scene.output.probes)
+            require(not self.history or self.history["rows"].shape[1] == columns, "other columns of the history")
             simulation.restore(self.arrays, self.header["values"])
-        except KeyError as error:
-            raise SceneError("checkpoint", str(self.path), f"it holds other arrays: {error}") from None
+
+
+def _check_header(header: Mapping) -> None:
+    """Refuse, inside of `reading`, a header whose entries are not of the kind that is written."""
+    for name in ("scene", "precision", "device", "python", "content"):
+        require(isinstance(header.get(name), str), f"{name} is no text")
+    for name in ("values", "run", "probes"):
+        require(isinstance(header.get(name), dict), f"{name} is no table")
+    values = header["values"]
+    numbers = [values[name] for name in COUNTERS] + [values.get("wall_time", 0.0)]
+    require(all(isinstance(value, int | float) and value >= 0 for value in numbers), "its numbers are not ours")
+    require(isinstance(values["steps"], int) and math.isfinite(values["time"]), "its numbers are not ours")
+    require(isinstance(values["stepper"], dict), "its numbers are not ours")
+    stretch = values["stretch"]
+    if stretch is not None:
+        require(sorted(stretch) == sorted(Stretch.__dataclass_fields__), "its steps are not ours")
+        require(isinstance(stretch["steps"], int) and stretch["steps"] > 0 and isinstance(stretch["first"], int), "its steps")
+        require(all(math.isfinite(stretch[name]) for name in ("start", "end")), "its steps are not ours")
 
 
 def write_checkpoint(
@@ -119,9 +151,12 @@ def write_checkpoint(
         "device": simulation.device.alias,
         "values": values,
         "run": dict(run or {}),
+        "probes": simulation.scene.probe_identities,
+        "python": PYTHON,
     }
     content = {f"{STATE}{name}": value for name, value in arrays.items()}
     content |= {f"{HISTORY}{name}": value for name, value in (history.state() if history else {}).items()}
+    header["content"] = digest(content)
     text = np.frombuffer(json.dumps(header).encode("utf-8"), dtype=np.uint8)
     packed = io.BytesIO()  # a disk that fills up then meets one plain write
     np.savez(packed, header=text, **content)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import io
 import math
+import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..storage.files import whole
+from ..storage.reading import reading, require
 from .simulation import Simulation
 
 
@@ -52,12 +56,12 @@ class History:
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
         self._rows: list[list[float]] = []
         self.next_time = -math.inf  # of the simulation [s], when to sample next
-        self._file = None if path is None else _Rows(path)
-        self._write([f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)])
+        if state is not None:
+            self._restore(state)
+        header = [f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)]
+        self._file = None if path is None else _Rows(path, [header, *map(_texts, self._rows)])
         if state is None:
             self.observe(simulation)
-        else:
-            self._restore(state)
 
     def observe(self, simulation: Simulation) -> None:
         """Sample when the interval has passed."""
@@ -74,7 +78,14 @@ class History:
             return
         row = [simulation.steps, simulation.time, *(probe.function(simulation) for probe in self._probes)]
         self._rows.append(row)
-        self._write(_texts(row))
+        if self._file:
+            self._file.write([_texts(row)])
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the file as it is when every row is in it, as hexadecimal digits."""
+        header = [f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)]
+        return hashlib.sha256(_encoded([header, *map(_texts, self._rows)])).hexdigest()
 
     def state(self) -> dict[str, np.ndarray]:
         """All that is needed to go on: the rows, and when to sample next [s]."""
@@ -84,11 +95,6 @@ class History:
     def _restore(self, state: Mapping[str, np.ndarray]) -> None:
         self.next_time = float(state["next"])
         self._rows = [[int(row[0]), *row[1:]] for row in state["rows"].tolist()]
-        self._write(*map(_texts, self._rows))
-
-    def _write(self, *rows: list) -> None:
-        if self._file:
-            self._file.write(rows)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """All samples of one column."""
@@ -109,18 +115,27 @@ def _texts(row: list[float]) -> list:
     return [row[0], *(repr(float(value)) for value in row[1:])]
 
 
+def _encoded(rows: Iterable[list]) -> bytes:
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode("utf-8")
+
+
 class _Rows:
-    """A CSV file that always ends with a whole row, also where the disk fills up."""
+    """A CSV file that always ends with a whole row, also where the disk fills up.
 
-    def __init__(self, path: Path):
-        self._path, self._waiting, self._end, self._failed = path, b"", 0, False
-        self._file = path.open("wb", buffering=0)
+    It takes the place of a former one when its first rows are in it.
+    """
 
-    def write(self, rows: tuple[list, ...]) -> None:
+    def __init__(self, path: Path, rows: Sequence[list]):
+        self._path, self._waiting, self._end, self._failed = path, _encoded(rows), 0, False
+        with whole(path) as temporary:
+            self._file = temporary.open("wb", buffering=0)
+            self._flush()
+
+    def write(self, rows: Iterable[list]) -> None:
         """Add rows; those that the disk does not take are kept for the next time."""
-        text = io.StringIO(newline="")
-        csv.writer(text).writerows(rows)
-        self._waiting += text.getvalue().encode("utf-8")
+        self._waiting += _encoded(rows)
         self._flush()
 
     def _flush(self) -> None:
@@ -143,6 +158,8 @@ class _Rows:
         self._flush()
         if self._waiting:
             print(f"warpsph: {self._path} lacks its last rows: the disk did not take them", file=sys.stderr)
+        with contextlib.suppress(OSError):
+            os.fsync(self._file.fileno())
         self._file.close()
 
 
@@ -150,11 +167,16 @@ def read_history(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Columns and units of a history file by name; an unfinished last line is left out.
 
     Raises:
-        OSError: there is no such file.
+        SceneError: there is no such file, or it is no history.
     """
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
+    with reading("history", path):
+        text = path.read_bytes().decode("utf-8")
+        whole_lines = text[: text.rfind("\n") + 1]
+        header, *rows = list(csv.reader(io.StringIO(whole_lines, newline=""), strict=True)) or [[]]
+        require(header[:2] == ["step [-]", "time [s]"], "it does not begin with step and time")
+        require(all(len(row) == len(header) for row in rows), "its rows are not of one length")
+        table = np.array(rows, dtype=float).reshape(-1, len(header))
+        require(bool(np.isfinite(table[:, :2]).all()), "its times are not finite")
     names = [cell.rsplit(" [", 1)[0] for cell in header]
     units = [cell.rsplit(" [", 1)[-1].rstrip("]") for cell in header]
-    table = np.array([row for row in rows if len(row) == len(header)], dtype=float).reshape(-1, len(header))
     return dict(zip(names, table.T, strict=True)), dict(zip(names, units, strict=True))

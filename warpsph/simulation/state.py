@@ -7,12 +7,14 @@ could be forgotten.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import is_dataclass
 from typing import NamedTuple
 
 import numpy as np
 import warp as wp
+
+from ..storage.reading import check_indices, require
 
 PACKAGE = __package__.partition(".")[0]
 
@@ -53,15 +55,22 @@ def restore(root: object, saved: Mapping[str, np.ndarray], values: Mapping[str, 
 
     Values go into the arrays that are there, since kernels may hold them. A list that had grown gets a new array.
 
+    Nothing is put back unless all of it fits: kernels do not look whether an index leads out of its array.
+
     Raises:
-        KeyError: the names differ.
+        ValueError: the names differ, or a value is of another type, shape or range than it can have.
     """
     seats, own = _seats(root), numbers(root)
-    if seats.keys() != saved.keys() or own.keys() != values.keys():
-        raise KeyError(*sorted((seats.keys() ^ saved.keys()) | (own.keys() ^ values.keys())))
+    require(seats.keys() == saved.keys(), f"other arrays: {_some(seats.keys() ^ saved.keys())}")
+    require(own.keys() == values.keys(), f"other numbers: {_some(own.keys() ^ values.keys())}")
+    for path, number in own.items():
+        require(type(values[path]) is type(number), f"{path} is {values[path]!r}")
+    for path, holding in seats.items():
+        _check(path, holding, saved[path])
+    _check_lists(root, saved, seats)
     for path, holding in seats.items():
         array, new = holding[0].value, saved[path]
-        if new.shape[: array.ndim] == array.shape:
+        if new.shape[: array.ndim] == array.shape:  # NumPy's has the components of vectors as well
             array.assign(new)
         else:
             replacement = wp.array(new, dtype=array.dtype, device=array.device)
@@ -70,6 +79,46 @@ def restore(root: object, saved: Mapping[str, np.ndarray], values: Mapping[str, 
     for slot in slots(root):
         if slot.path in values:
             slot.put(values[slot.path])
+
+
+def _some(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names)[:5])
+
+
+def _check(path: str, holding: list[Slot], new: np.ndarray) -> None:
+    """Refuse an array that can not take the place of the one that is there."""
+    now = holding[0].value.numpy()
+    grows = any(_in_list(slot) for slot in holding) and new.ndim == now.ndim == 1  # lists take more neighbours
+    require(new.dtype == now.dtype, f"{path} is of type {new.dtype}")
+    require(grows or new.shape == now.shape, f"{path} has shape {new.shape}")
+    for part in [new] if new.dtype.names is None else [new[name] for name in new.dtype.names]:
+        require(part.dtype.kind != "f" or bool(np.isfinite(part).all()), f"{path} is not finite everywhere")
+    # What kernels find their way by is in the scene's tables, or from the start more than a flag.
+    if new.dtype.kind in "iu" and not grows and new.size and (np.ptp(now) > 1 or _in_table(holding)):
+        low, high = min(now.min(), 0), max(now.max(), 1)
+        require(low <= new.min() and new.max() <= high, f"{path} leads out of its table")
+
+
+def _in_list(slot: Slot) -> bool:
+    return hasattr(slot.holder, "pairs") or {"start", "index"} <= vars(slot.holder).keys()
+
+
+def _in_table(holding: list[Slot]) -> bool:
+    kinds = {kind.__name__ for slot in holding for kind in type(slot.holder).__mro__}
+    return "StructInstance" in kinds  # of Warp: what kernels are given
+
+
+def _check_lists(root: object, saved: Mapping[str, np.ndarray], seats: Mapping[str, list[Slot]]) -> None:
+    """Refuse pair lists that lead beyond their ends, or to points that are not there."""
+    path_of = {id(slot.value): path for path, holding in seats.items() for slot in holding}
+    for slot in slots(root):
+        sources = getattr(slot.holder, "_sources", None)
+        if slot.name != "pairs" or sources is None or slot.value.index is None:
+            continue
+        start, index = (saved[path_of[id(array)]] for array in (slot.value.start, slot.value.index))
+        right = start.shape == slot.value.start.shape and not start[0] and (np.diff(start) >= 0).all()
+        require(bool(right and start[-1] <= len(index)), f"{slot.path} leads out of its list")
+        check_indices(slot.path, index[: start[-1]], sources.point.shape[0])
 
 
 def _seats(root: object) -> dict[str, list[Slot]]:

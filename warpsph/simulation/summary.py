@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import warp as wp
 
 from ..scene.check import Check
-from ..storage.files import write_whole
+from ..storage.reading import checked, read_json
 from .simulation import Simulation
 
 
@@ -22,6 +20,7 @@ def summarise(
     version: str,
     error: str | None = None,
     stopped: bool = False,
+    history: str | None = None,
 ) -> dict:
     """What `summary.json` says.
 
@@ -33,6 +32,7 @@ def summarise(
         version: of warpsph.
         error: why the run broke down, or None.
         stopped: whether it was asked to stop on its way.
+        history: digest of the history that belongs to it.
     """
     stepped = simulation.steps > 0
     rate = len(simulation.mesh.nodes) * simulation.steps / simulation.wall_time if stepped else 0.0
@@ -58,21 +58,47 @@ def summarise(
         "neighbour_list_builds": simulation.list_builds,
         "stopped": stopped,
         "error": error,
+        "history": history,
         "checks": [check.as_dict() for check in checks],
     }
 
 
-def write_json(path: Path, content: Mapping) -> None:
-    """Write a JSON file whole or not at all; non-finite numbers become null."""
-    text = json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("utf-8")))
+def read_summary(path: Path) -> dict:
+    """What `summary.json` says, as far as others rely on it.
+
+    Raises:
+        SceneError: it is not there, or not as `summarise` makes it.
+    """
+    return checked("summary", path, read_json("summary", path), RULES)
 
 
-def _finite(value):
-    if isinstance(value, Mapping):
-        return {key: _finite(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(part) for part in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+def _text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _count(value: object) -> bool:
+    return isinstance(value, int) and 0 <= value < 10**18
+
+
+def _check(value: object) -> bool:
+    return (
+        isinstance(value, dict)
+        and all(_text(value.get(name)) for name in ("name", "unit"))
+        and all(value.get(name) is None or _number(value[name]) for name in ("value", "reference", "error"))
+        and isinstance(value.get("passed"), bool)
+    )
+
+
+RULES = {
+    **dict.fromkeys(("scene", "warpsph_version", "device", "device_name"), _text),
+    **dict.fromkeys(("nodes", "steps"), _count),
+    **dict.fromkeys(("simulated_time", "wall_time", "node_steps_per_second"), _number),
+    **dict.fromkeys(("error", "history"), lambda value: value is None or _text(value)),
+    "stopped": lambda value: isinstance(value, bool),
+    "parameters": lambda value: isinstance(value, dict),
+    "checks": lambda value: isinstance(value, list) and all(map(_check, value)),
+}

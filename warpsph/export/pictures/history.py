@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from ...errors import SceneError
 from ...simulation.history import History, read_history
 from ...simulation.simulation import Simulation
 from ..frames import Frames
@@ -59,15 +60,18 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
 
 def curves_of(frames: Frames) -> list[HistoryCurve]:
     """The first curves of the run that the frames are of: the scene's own, then its probes over time."""
-    try:
-        columns, units = read_history(frames.run / "history.csv")
-    except (OSError, ValueError):
+    path = frames.run / "history.csv"
+    if not path.exists():
         return []
+    columns, units = read_history(path)
     probes = [name for name in columns if name not in ("step", "time")]
 
     def column(name: str) -> tuple[str, np.ndarray]:
         return axis_label(name, units[name]), columns[name]
 
+    for name in frames.about["curve"] or ():
+        if name not in columns:
+            raise SceneError("history", str(path), f"it has no column {name!r}, which about.json says to draw")
     first = frames.about["curve"] or (("time", probes[0]) if probes else None)
     pairs = [tuple(first)] if first else []
     pairs += [("time", name) for name in probes if not first or name not in first]

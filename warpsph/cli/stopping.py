@@ -1,0 +1,69 @@
+"""Signals that ask a run to stop: it does after the step it is in, with a checkpoint."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from ..errors import StoppedError
+from ..simulation.checkpoint import Checkpoints
+from ..simulation.simulation import Simulation
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextlib.contextmanager
+def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
+    """Signals that end a process go to a handler meanwhile; those that are ignored stay so.
+
+    Only a main thread can do this; elsewhere nothing changes.
+    """
+    previous = {}
+    if threading.current_thread() is threading.main_thread():
+        for each in SIGNALS:
+            if signal.getsignal(each) is not signal.SIG_IGN:  # a worker leaves interrupts to its parent
+                previous[each] = signal.signal(each, handler)
+    try:
+        yield
+    finally:
+        for each, former in previous.items():
+            signal.signal(each, former)
+
+
+class Stopper:
+    """An observer that writes the checkpoints, and ends the run with one when a signal asked for it.
+
+    A second signal does not wait for the step to end.
+
+    Args:
+        checkpoints: writes them.
+        folder: of the run.
+    """
+
+    def __init__(self, checkpoints: Checkpoints, folder: Path):
+        self._checkpoints, self._folder, self._asked = checkpoints, folder, None
+
+    @property
+    def next_time(self) -> float:
+        """When the next checkpoint may be due [s]."""
+        return self._checkpoints.next_time
+
+    def ask(self, number: int, frame: object) -> None:
+        """Handle a signal."""
+        if self._asked is not None:
+            raise KeyboardInterrupt
+        self._asked = number
+
+    def observe(self, simulation: Simulation) -> None:
+        """Write a checkpoint when one is due; raise a `StoppedError` when the run was asked to stop."""
+        if self._asked is None:
+            self._checkpoints.observe(simulation)
+            return
+        written = self._checkpoints.write(simulation)
+        then = f"go on with: warpsph run --resume {self._folder}" if written else "without a checkpoint"
+        raise StoppedError(
+            f"stopped after step {simulation.steps}, t = {simulation.time:.6g} s; {then}", self._asked
+        )
