@@ -165,7 +165,7 @@ SHAPES = [
     (lambda: Polygon([(0, 0), (1, 1), (1,)], 0.1), "vertices", "(1,)", "2 finite numbers"),
     (lambda: Polygon(3, 0.1), "vertices", 3, "three or more"),
     (lambda: Polygon([(0, 0), (1e12, 0), (2e12, 0)], 1.0), "spacing", 1.0, "fewer than"),
-    (lambda: scene(shape=Polygon([(0, 0), (1, 0), (0, 1)], 1.5)), "shape", "'no cell'", "whole cell"),
+    (lambda: scene(shape=Polygon([(0, 0), (1, 0), (0, 1)], 1.0)), "spacing", 1.0, "it must be finer"),
     (lambda: scene(shape="Box"), "shape", "'Box'", "a shape such as Box"),
     (lambda: scene(shape=Box), "shape", None, "a shape such as Box"),
     (lambda: PLATE.rotated(0.1, about=(1.0,)), "rotated.about", "(1.0,)", "2 finite numbers"),

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
-import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +26,7 @@ from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
 from ..validate import instance, listed
+from .neighbours import Neighbours
 from .settings import Settings
 
 DEFAULT_NUMERICS = "numerics=default"
@@ -50,6 +50,7 @@ class SceneFile:
 
     name: str
     module: ModuleType
+    neighbours: Neighbours
     settings = Settings()  # how it is run unless asked otherwise
 
     @property
@@ -101,9 +102,11 @@ class SceneFile:
 
     @contextlib.contextmanager
     def errors_located(self) -> Iterator[None]:
-        """Turns what a function of the file raises into a `SceneError` that names the line."""
+        """For what calls functions of the file: they import as they did while it was loaded, and what they raise
+        becomes a `SceneError` that names the line."""
         try:
-            yield
+            with self.neighbours.importable():
+                yield
         except WarpSPHError:
             raise
         except (Exception, SystemExit) as error:  # a user's function may raise anything
@@ -140,26 +143,16 @@ def load_file(path: Path, *, name: str, neighbours: Path) -> SceneFile:
     spec = importlib.util.spec_from_file_location(f"warpsph_scene_{path.stem}", path)
     if spec is None:
         raise SceneError("scene", str(path), "the file's name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up there
+    module, own = importlib.util.module_from_spec(spec), Neighbours(neighbours)
+    own.add(spec.name, module)  # dataclasses look their module up
     try:
-        with _importing_from(neighbours):
+        with own.importable():
             spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
-    return SceneFile(name, module)
-
-
-@contextlib.contextmanager
-def _importing_from(folder: Path) -> Iterator[None]:
-    """Lets a scene file import its neighbours, as a script may."""
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
+    return SceneFile(name, module, own)
 
 
 def _located(path: Path, error: BaseException) -> SceneError:
