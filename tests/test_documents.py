@@ -27,7 +27,7 @@ def everywhere(language):
 
 
 @pytest.mark.parametrize("block", everywhere("python"))
-def test_python_runs(block, maxwell, tmp_path, monkeypatch):
+def test_python_runs(block, maxwell, registered, tmp_path, monkeypatch):
     """A scene file also as `warpsph run` does it, with its checks."""
     monkeypatch.chdir(tmp_path)
     if callable(getattr(run_as_module("block", block, tmp_path), "scene", None)):
@@ -72,7 +72,9 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize("space", [warpsph, warpsph.analysis, warpsph.frames], ids=lambda space: space.__name__)
+@pytest.mark.parametrize(
+    "space", [warpsph, warpsph.analysis, warpsph.frames, warpsph.materials], ids=lambda space: space.__name__
+)
 def test_every_public_name_has_a_place_in_the_docs(space):
     assert set(space.__all__) - WORDS == set()
 

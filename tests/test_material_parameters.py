@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import pytest
 
 from warpsph import Elastic, Parameter, PerzynaVonMises, SceneError
-from warpsph.materials import LAWS
 from warpsph.scene.parameter import assign, namespace, numerical_parameters
+from warpsph.scene.registry import MATERIALS
 
 CLAY = PerzynaVonMises(
     young_modulus=2e7, poisson_ratio=0.4, density=1900.0, fluidity=3.0, yield_size=2e3, hardening=-1e3
 )
 
 
-@pytest.mark.parametrize("material", LAWS, ids=lambda material: material.__name__)
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=lambda material: material.__name__)
 def test_every_parameter_of_every_material_has_unit_and_meaning(material):
     for entry in dataclasses.fields(material):
         assert entry.metadata["unit"] and entry.metadata["meaning"], entry.name
@@ -41,6 +41,6 @@ def test_bad_values_and_names_are_refused_in_one_line():
     with pytest.raises(SceneError, match=r"^hardening = -30000000.0 .* above -20000000.0$"):
         CLAY.with_parameters(SimpleNamespace(hardening=-3e7))
     with pytest.raises(
-        SceneError, match=r"^Parameter.of = 'yield' .* one of young_modulus, poisson_ratio, density$"
+        SceneError, match=r"^Parameter.of = 'yield' .* one of density, young_modulus, poisson_ratio$"
     ):
         Parameter.of(Elastic(young_modulus=1e6, density=1.0), "yield")

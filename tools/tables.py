@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from warpsph.cli.main import _parser
-from warpsph.scene.material import Elastic, PerzynaVonMises
+from warpsph.materials import Elastic, PerzynaVonMises
 from warpsph.scene.parameter import numerical_parameters
 from warpsph.simulation.fields import FIELDS
 
@@ -58,6 +58,12 @@ def parameters(material: type) -> str:
     return table(("parameter", "unit", "meaning", "allowed", "default"), rows)
 
 
+def material_fields(material: type) -> str:
+    """What it adds to the fields of the nodes."""
+    rows = [(f"`{field.name}`", field.unit, field.meaning) for field in (*material.internals, *material.derived)]
+    return table(("field", "unit", "meaning"), rows)
+
+
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The commands by name."""
     (subparsers,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -80,6 +86,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "numerics": numerics,
     "fields": fields,
     **{f"parameters of {kind.__name__}": partial(parameters, kind) for kind in (Elastic, PerzynaVonMises)},
+    "fields of PerzynaVonMises": partial(material_fields, PerzynaVonMises),
     **{f"options of {name}": partial(options, command) for name, command in commands().items()},
 }
 

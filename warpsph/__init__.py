@@ -20,6 +20,7 @@ __version__ = "0.1.0"
 
 from . import analysis, frames
 from .errors import NonFiniteError, SceneError, WarpSPHError
+from .materials import Elastic, Material, PerzynaVonMises
 from .scene import (
     PUBLISHED,
     BodyForce,
@@ -27,7 +28,6 @@ from .scene import (
     Check,
     Disc,
     EdgeForce,
-    Elastic,
     Fixed,
     Free,
     FreeSurface,
@@ -36,7 +36,6 @@ from .scene import (
     Numerics,
     Output,
     Parameter,
-    PerzynaVonMises,
     Polygon,
     PrescribedVelocity,
     Probe,
@@ -46,10 +45,12 @@ from .scene import (
     Rotating,
     Scene,
     Shape,
+    SmoothingKernel,
     Table,
     edge,
     everywhere,
     region,
+    register,
     where,
 )
 from .simulation.checkpoint import Checkpoint, write_checkpoint
@@ -70,6 +71,7 @@ __all__ = [
     "FreeSurface",
     "History",
     "Linear",
+    "Material",
     "NodeValue",
     "NonFiniteError",
     "Numerics",
@@ -88,6 +90,7 @@ __all__ = [
     "SceneError",
     "Shape",
     "Simulation",
+    "SmoothingKernel",
     "Table",
     "WarpSPHError",
     "analysis",
@@ -95,6 +98,7 @@ __all__ = [
     "everywhere",
     "frames",
     "region",
+    "register",
     "where",
     "write_checkpoint",
 ]

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from itertools import product
 
-from warpsph.scene.numerics import KERNELS, Numerics
+from warpsph.scene.numerics import Numerics
+from warpsph.scene.registry import KERNELS
 from warpsph.scene.scheme import SCHEMES
 
 COURANT = (0.4, 0.8, 0.9, 1.0)

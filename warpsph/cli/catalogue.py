@@ -140,7 +140,7 @@ def load_file(path: Path, *, name: str, neighbours: Path) -> SceneFile:
     Raises:
         SceneError: the file can not be loaded.
     """
-    spec = importlib.util.spec_from_file_location(f"warpsph_scene_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(f"warpsph_scene_{name}", path)
     if spec is None:
         raise SceneError("scene", str(path), "the file's name must end in .py")
     module, own = importlib.util.module_from_spec(spec), Neighbours(neighbours)

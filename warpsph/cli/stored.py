@@ -111,8 +111,13 @@ class StoredScene:
                 built.append(self.source.build_from(self._values))
             return built[0]
 
-        scene = decode(document | {"name": self.name}, self._arrays(), code)
-        return scene, self._values
+        document, arrays = document | {"name": self.name}, self._arrays()
+        try:
+            return decode(document, arrays, code), self._values
+        except SceneError:
+            if self.source is None:
+                raise
+        return decode(document, arrays, code), self._values  # the scene file, read now, may register what it names
 
     def _arrays(self) -> dict[str, np.ndarray]:
         path = self.path.with_suffix(".npz")

@@ -15,7 +15,6 @@ import warp as wp
 from ..device.compiling import forward_kernel
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..scene.numerics import KERNELS
 from ..state.body import Body
 
 
@@ -48,7 +47,7 @@ class Motion:
     def __init__(self, body: Body, *, skin: float, outdated: wp.array):
         space, nodes = body.space, body.nodes
         self._body, self._skin, self._outdated = body, skin, outdated
-        self._support = KERNELS[body.scene.numerics.kernel].support
+        self._support = body.scene.numerics.smoothing.support
         self._reference_density = body.scene.material.density
         self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
         self._listed = wp.zeros_like(nodes.displacement)

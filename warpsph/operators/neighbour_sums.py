@@ -16,9 +16,8 @@ import warp as wp
 
 from ..device.arrays import natural, packed
 from ..device.rows import add_outer
-from ..physics.smoothing import SMOOTHING_FUNCTIONS
 from ..physics.space import Space
-from ..scene.numerics import KERNELS
+from ..scene.smoothing import SmoothingKernel
 from ..state.pairs import PairList
 
 
@@ -55,8 +54,8 @@ def batch_on(device: wp.Device) -> int:
 
 
 @cache
-def neighbour_sums(space: Space, kernel: str, batch: int = CPU_BATCH) -> NeighbourSums:
-    """The pass for one smoothing function, with so many neighbours' weights found at a time."""
+def neighbour_sums(space: Space, kernel: SmoothingKernel, batch: int = CPU_BATCH) -> NeighbourSums:
+    """The pass for one smoothing kernel, with so many neighbours' weights found at a time."""
     types, real = space.types, space.real
     length = space.dim + types.size
     row, with_outer = space.vec(length), add_outer(space.dim, length, space.precision)
@@ -125,13 +124,13 @@ def neighbour_sums(space: Space, kernel: str, batch: int = CPU_BATCH) -> Neighbo
 
 
 @cache
-def _weigh(space: Space, kernel: str, batch: int) -> tuple[wp.Function, wp.Function]:
+def _weigh(space: Space, kernel: SmoothingKernel, batch: int) -> tuple[wp.Function, wp.Function]:
     """W and −W′/ξ of so many neighbours at a time, and the index of one.
 
     Loops are written with `while` and without branches, since that is what compilers turn into SIMD.
     """
-    real, numbers, weights = space.real, space.vec(batch), SMOOTHING_FUNCTIONS[kernel](space.precision)
-    support_squared = EDGE * KERNELS[kernel].support ** 2
+    real, numbers, weights = space.real, space.vec(batch), kernel.weights(space.precision)
+    support_squared = EDGE * kernel.support**2
     packed_points, packed_list = packed(wp.array(dtype=space.types.Point)), packed(PairList)
 
     @wp.func

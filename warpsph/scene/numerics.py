@@ -7,28 +7,10 @@ from dataclasses import dataclass
 from ..errors import SceneError
 from ..mesh.continuum import Continuum
 from ..validate import choice, number
+from .registry import KERNELS
 from .scheme import Scheme, scheme_of
+from .smoothing import SmoothingKernel
 
-
-@dataclass(frozen=True)
-class SmoothingChoice:
-    """A smoothing function W(r/h) as far as a scene must know it.
-
-    Attributes:
-        support: radius of the support in smoothing lengths.
-        smoothing_ratio: default h/Δx.
-    """
-
-    support: float
-    smoothing_ratio: float
-
-
-# The defaults reach 1.8 Δx, a little beyond the 1.58 Δx (1.66 in 3D) that a corner node needs.
-KERNELS = {
-    "gaussian": SmoothingChoice(support=3.0, smoothing_ratio=0.6),
-    "cubic_spline": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
-    "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
-}
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
@@ -39,7 +21,7 @@ class Numerics:
     """Choices of the discretisation.
 
     Args:
-        kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
+        kernel: smoothing kernel: gaussian (the paper's), cubic_spline, wendland_c2 or one that was registered.
         smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given. With
             `compatible` keep the support below 2.12 Δx, and it must be at most 2.55 Δx: see
             docs/velocity_steps.md, "What still fails".
@@ -61,11 +43,16 @@ class Numerics:
         choice("kernel", self.kernel, KERNELS)
         scheme_of(self.velocity_scheme)
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
-        ratio = KERNELS[self.kernel].smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
+        ratio = self.smoothing.smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
         object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
         if self.time_step is not None:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
+
+    @property
+    def smoothing(self) -> SmoothingKernel:
+        """The smoothing kernel that `kernel` names."""
+        return KERNELS[self.kernel]
 
     @property
     def scheme(self) -> Scheme:
@@ -75,7 +62,7 @@ class Numerics:
     @property
     def support(self) -> float:
         """Radius of the support over spacing [-]."""
-        return KERNELS[self.kernel].support * self.smoothing_ratio
+        return self.smoothing.support * self.smoothing_ratio
 
     def check_support(self, continuum: Continuum, stretch: float = 1.0) -> None:
         """Refuse a support that is too small (or absurdly large) for the lattice.
@@ -84,7 +71,7 @@ class Numerics:
             continuum: the continuum, for its number of dimensions.
             stretch: longest cell edge over spacing, 1 on a regular lattice.
         """
-        support = KERNELS[self.kernel].support
+        support = self.smoothing.support
         least = continuum.smallest_support * stretch / support
         most = self.scheme.largest_support(continuum.dim) / support
         if not least < self.smoothing_ratio <= most:

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
 from ..validate import instance, number
-from .material import Elastic
-from .numerics import KERNELS, SOURCE_SCHEMES, Numerics
+from .material import Material
+from .numerics import SOURCE_SCHEMES, Numerics
+from .registry import KERNELS
 from .scheme import SCHEMES
 
 
@@ -44,13 +45,14 @@ class Parameter:
         instance(self.name, self.default, float | int | str | None, "a number, True or False, a text or None")
 
     @classmethod
-    def of(cls, material: Elastic, *names: str) -> tuple[Parameter, ...]:
+    def of(cls, material: Material, *names: str) -> tuple[Parameter, ...]:
         """The parameters of a material, its values the defaults; `material.with_parameters(p)` is the way back.
 
         Args:
             material: an example of it.
             names: which, and in which order; all unless given.
 
+        >>> from warpsph import Elastic
         >>> clay = Elastic(young_modulus=1e6, poisson_ratio=0.4, density=1800.0)
         >>> Parameter.of(clay, "density")[0].unit, clay.with_parameters(SimpleNamespace(density=1900.0)).density
         ('kg/m³', 1900.0)

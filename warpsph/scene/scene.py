@@ -23,7 +23,7 @@ from ..validate import (
 from .code import identity
 from .condition import Condition, Free
 from .free_surface import FreeSurface
-from .material import Elastic
+from .material import Material
 from .numerics import Numerics
 from .output import Output
 from .resolve import BoundaryTable, resolve
@@ -61,7 +61,7 @@ class Scene:
 
     Args:
         shape: the body with its lattice.
-        material: `Elastic` or `PerzynaVonMises`.
+        material: what it is made of, such as `Elastic` (`warpsph.materials`).
         duration: simulated time [s].
         conditions: boundary conditions; an edge without one is free of traction (with a published velocity
             scheme it keeps whatever traction it has).
@@ -93,7 +93,7 @@ class Scene:
     """
 
     shape: Shape
-    material: Elastic
+    material: Material
     duration: float
     conditions: tuple[Condition, ...] = ()
     free_surface: FreeSurface | None = None
@@ -108,7 +108,7 @@ class Scene:
 
     def __post_init__(self):
         instance("shape", self.shape, Shape, "a shape such as Box(size=(1, 1), spacing=0.1)")
-        instance("material", self.material, Elastic, "a material such as Elastic(…)")
+        instance("material", self.material, Material, "a material such as Elastic(…)")
         instance("numerics", self.numerics, Numerics, "Numerics(…)")
         instance("output", self.output, Output, "Output(…)")
         instance("name", self.name, str, "a string")
@@ -120,6 +120,7 @@ class Scene:
         )
         for index, condition in enumerate(self.conditions):
             instance(f"conditions[{index}]", condition, Condition, "a condition such as Fixed(edge('left'))")
+        self.material.check_continuum(self.mesh.continuum)
         dim = self.mesh.dim
         if self.body_force is not None:
             instance("body_force", self.body_force, BodyForce, "BodyForce(…) or None")
@@ -129,7 +130,7 @@ class Scene:
         scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
         scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
-        _ = self.boundary, self.initial_velocity, self.initial_stress
+        _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
@@ -172,6 +173,11 @@ class Scene:
     def probe_identities(self) -> dict[str, str]:
         """What each probe computes, by its name, as it was when this was asked first: functions may keep notes."""
         return {probe.name: identity(probe.function) for probe in self.output.probes}
+
+    @cached_property
+    def initial_internals(self) -> np.ndarray:
+        """The material's internal variables, in its order, shape (n, m)."""
+        return self.material.initial_internals(self.mesh.nodes)
 
     def _initial(self, name: str, function: Callable | None, size: int) -> np.ndarray:
         if function is None:

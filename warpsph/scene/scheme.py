@@ -1,7 +1,8 @@
 """What a scheme must be: everything that depends on how velocities and stresses are advanced, in one record.
 
-A scheme is one file in `warpsph.step` and one row in `warpsph.step.scheme`; a scene names it, and nothing else in
-the package asks for a name. Its parts that need Warp are classes here, made when a simulation is built.
+A scheme is one file in `warpsph.step` and one row in `warpsph.step.scheme`, which registers it. A scene names it,
+and nothing else in the package asks for a name. Its parts that need Warp are classes here, made with a
+simulation.
 """
 
 from __future__ import annotations
@@ -76,17 +77,6 @@ class Scheme:
 
 
 SCHEMES: dict[str, Scheme] = {}
-
-
-def register_scheme(scheme: Scheme) -> None:
-    """Make a scheme known by its name.
-
-    Raises:
-        SceneError: another one has that name.
-    """
-    if SCHEMES.get(scheme.name, scheme) != scheme:
-        raise SceneError("Scheme.name", scheme.name, "another scheme has that name")
-    SCHEMES[scheme.name] = scheme
 
 
 def scheme_of(name: str) -> Scheme:

@@ -125,7 +125,8 @@ def _check_header(header: Mapping) -> None:
     stretch = values["stretch"]
     if stretch is not None:
         require(sorted(stretch) == sorted(Stretch.__dataclass_fields__), "its steps are not ours")
-        require(isinstance(stretch["steps"], int) and stretch["steps"] > 0 and isinstance(stretch["first"], int), "its steps")
+        counts = stretch["steps"], stretch["first"]
+        require(all(isinstance(count, int) for count in counts) and counts[0] > 0, "its steps are not ours")
         require(all(math.isfinite(stretch[name]) for name in ("start", "end")), "its steps are not ours")
 
 

@@ -6,11 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..device.precision import PRECISIONS
 from ..errors import SceneError
 from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
-from ..physics.smoothing import SMOOTHING_FUNCTIONS, second_moment
-from ..scene.numerics import KERNELS
+from ..physics.smoothing import second_moment
 from ..scene.scene import Scene
 
 ROUNDING = 1e-9
@@ -98,10 +96,8 @@ class TimeStep:
 
 def courant_limit(scene: Scene) -> float:
     """Largest stable c_p Δt/Δx of the wave part, by the scene's scheme (METHOD section 4)."""
-    numerics, precision = scene.numerics, PRECISIONS["float64"]
-    weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    support, dim = KERNELS[numerics.kernel].support, scene.mesh.dim
-    moment = second_moment(weight, precision, numerics.smoothing_ratio, support, dim)
+    numerics, dim = scene.numerics, scene.mesh.dim
+    moment = second_moment(numerics.smoothing, ratio=numerics.smoothing_ratio, dim=dim)
     return numerics.scheme.courant_limit(dim, moment)
 
 

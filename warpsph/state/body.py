@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import warp as wp
 
 from ..device.launching import Launcher
-from ..materials import law as material_law
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
@@ -47,7 +46,7 @@ class Body:
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
         """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
-        law, kind, device = material_law(scene.material, space), scene.mesh.kind, launcher.device
+        law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
         return Body(
             scene=scene,
             space=space,

@@ -57,10 +57,10 @@ def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
 
 
 def material_internals(scene: Scene, law: Law, space: Space, device: wp.Device) -> wp.array | None:
-    """The internal variables of the material nodes, zero; None for a law without any."""
+    """The internal variables of the material nodes at the start; None for a law without any."""
     if not law.internals:
         return None
-    return wp.zeros(len(scene.mesh.nodes), dtype=space.vec(len(law.internals)), device=device)
+    return wp.array(scene.initial_internals, dtype=space.vec(len(law.internals)), device=device)
 
 
 def auxiliary_nodes(scene: Scene, space: Space, kind: CellKind, device: wp.Device):

@@ -91,7 +91,7 @@ class CompatibleFluxes:
         self._front, self._corner_share = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
         means = cell_means(space, body.kind, numbers_side_by_side(device))
         self._cells = means.store.new(len(scene.mesh.cells), space, device)
-        sums = neighbour_sums(space, scene.numerics.kernel, batch_on(device))
+        sums = neighbour_sums(space, scene.numerics.smoothing, batch_on(device))
         metric = cell_metric(space, scene.numerics.smoothing_ratio)
         to_half_step = (half_step_gradient if scene.large_displacements else initial_gradient)(space)
         self._to_auxiliary = _to_auxiliary_kernel(space, body.kind, law, means, sums, metric)
@@ -151,10 +151,11 @@ def _to_auxiliary_kernel(
         L = space.phi.velocity_gradient(cell.gradient)
         q = front_pressure_at(a, wp.trace(L), cell.frame, auxiliary, nodes, front[0], dt)
         half = phi + real(0.5) * dt * minus_div_f  # 6
-        if wp.static(law.relax is not None):
+        if wp.static(law.flows):
             mean, smooth = internal(), types.tensor()
             for k in range(wp.static(kind.corners)):
-                mean += internals[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
+                if wp.static(len(law.internals) > 0):
+                    mean += internals[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
                 smooth += nodes.velocity_gradient[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
             rough = space.stress.elastic_rate(L - smooth, material.lame, material.shear, material.young)
             elastic = real(0.5) * dt * rough

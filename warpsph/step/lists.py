@@ -2,7 +2,6 @@
 
 from ..device.compiling import load_kernels
 from ..operators.motion import NoMotion, centre_kernel
-from ..scene.numerics import KERNELS
 from ..state.body import Body
 from ..state.clock import Clock
 from ..state.pairs import SKIN, Neighbours, Search
@@ -33,7 +32,7 @@ class PairLists:
         if scene.large_displacements:
             skin = SKIN * scene.mesh.spacing
             self.motion = scene.numerics.scheme.motion(body, skin=skin, outdated=self._outdated)
-        search = Search(support=KERNELS[scene.numerics.kernel].support, spacing=scene.mesh.spacing, skin=skin)
+        search = Search(support=scene.numerics.smoothing.support, spacing=scene.mesh.spacing, skin=skin)
         self._auxiliary = Neighbours(body.space, launcher, targets=auxiliary, sources=nodes, search=search)
         self._nodes = Neighbours(body.space, launcher, targets=nodes, sources=auxiliary, search=search)
         self.around_auxiliary, self.around_nodes = self._auxiliary.pairs, self._nodes.pairs

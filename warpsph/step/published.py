@@ -77,7 +77,7 @@ class PublishedFluxes:
         self._body, self._conditions = body, conditions
         self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
         space, law = body.space, body.law
-        sums = neighbour_sums(space, body.scene.numerics.kernel, batch_on(body.launcher.device))
+        sums = neighbour_sums(space, body.scene.numerics.smoothing, batch_on(body.launcher.device))
         to_half_step = (half_step_gradient if body.scene.large_displacements else initial_gradient)(space)
         self._to_auxiliary = _to_auxiliary_kernel(space, law, sums)
         self._to_nodes = _to_nodes_kernel(
