@@ -5,7 +5,7 @@ waves and leaves the checkerboard alone.
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 
 import warp as wp
 
@@ -164,11 +164,23 @@ def _to_nodes_kernel(
     return to_nodes
 
 
-def _published(name: str, meaning: str, advance_velocity: Callable[[Space], wp.Function]) -> Scheme:
+def published_scheme(name: str, *, meaning: str, advance_velocity: Callable[[Space], wp.Function]) -> Scheme:
+    """A scheme with the published sums and a velocity step of its own.
+
+    Args:
+        name: what `Numerics.velocity_scheme` calls it.
+        meaning: one line.
+        advance_velocity: space → Warp function (v_s, v^{n+1/2}, −div f, Δt) → v_adv of step 10b; cached.
+    """
+
+    @wraps(advance_velocity, updated=())  # a registered scheme belongs to the place that makes its step
+    def fluxes(body: Body, **more) -> PublishedFluxes:
+        return PublishedFluxes(advance_velocity, body, **more)
+
     return Scheme(
         name=name,
         meaning=meaning,
-        fluxes=lambda body, **more: PublishedFluxes(advance_velocity, body, **more),
+        fluxes=fluxes,
         motion=Motion,
         unloads=False,
         follows_cells=False,
@@ -177,5 +189,9 @@ def _published(name: str, meaning: str, advance_velocity: Callable[[Space], wp.F
     )
 
 
-BLANC_PASTOR = _published("blanc-pastor", "the published step, 2 v^{n+1/2} − v: filters waves", blanc_pastor)
-TAYLOR = _published("taylor", "the paper's complete scheme: leaves the checkerboard alone", taylor)
+BLANC_PASTOR = published_scheme(
+    "blanc-pastor", meaning="the published step, 2 v^{n+1/2} − v: filters waves", advance_velocity=blanc_pastor
+)
+TAYLOR = published_scheme(
+    "taylor", meaning="the paper's complete scheme: leaves the checkerboard alone", advance_velocity=taylor
+)
