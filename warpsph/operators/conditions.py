@@ -107,18 +107,19 @@ class Conditions:
         rows, size, types = len(boundary.nodes), space.continuum.stress_size, space.types
         row = np.full(n, -1, dtype=np.int32)
         row[boundary.nodes] = np.arange(rows, dtype=np.int32)
-        for name, values, dtype in (
-            ("row", row, wp.int32),
-            ("velocity_projector", boundary.velocity_projector, types.tensor),
-            ("stress_projector", boundary.stress_projector, space.mat(size, size)),
-            ("amplitude", boundary.amplitude, types.vector),
-            ("function", boundary.function, wp.int32),
-            ("traction", boundary.traction, types.vector),
-            ("traction_stress", boundary.traction_stress, space.mat(size, space.dim)),
-            ("traction_function", boundary.traction_function, wp.int32),
-            ("turned", np.tile(np.eye(space.dim), (rows, 1, 1)), types.tensor),
+        for name, values, ndim, dtype in (
+            ("row", row, 1, wp.int32),
+            ("velocity_projector", boundary.velocity_projector, 1, types.tensor),
+            ("stress_projector", boundary.stress_projector, 1, space.mat(size, size)),
+            ("amplitude", boundary.amplitude, 2, types.vector),
+            ("function", boundary.function, 2, wp.int32),
+            ("traction", boundary.traction, 2, types.vector),
+            ("traction_stress", boundary.traction_stress, 2, space.mat(size, space.dim)),
+            ("traction_function", boundary.traction_function, 2, wp.int32),
+            ("turned", np.tile(np.eye(space.dim), (rows, 1, 1)), 1, types.tensor),
         ):
-            setattr(self.table, name, wp.array(values, dtype=dtype, device=self._launcher.device))
+            shape, device = values.shape[:ndim], self._launcher.device
+            setattr(self.table, name, wp.array(values, dtype=dtype, shape=shape, device=device))
         self.table.drive = self._clock.drive
 
     def refresh(self) -> None:

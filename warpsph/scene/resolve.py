@@ -20,6 +20,7 @@ identity or Dₑ, G N = D Nᵀ (N D Nᵀ)⁻¹ N = 1 − Π. Where conditions me
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -177,6 +178,10 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         for node in corners:
             touching[node].append(face)
     face_normals = mesh.face_normals()
+    unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
+    for condition in conditions:
+        if isinstance(condition, Free) and condition.normal is None:
+            unmoved |= condition.on.faces(mesh)
     signatures: dict[int, list] = defaultdict(list)
     selected, covered = [], []
     for index, condition in enumerate(conditions):
@@ -187,9 +192,10 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         selected.append(nodes)
         covered.append(faces & nodes[mesh.faces].all(axis=1))
         given = getattr(condition, "normal", None)
+        edge = unmoved if isinstance(condition, Free) else faces
         for node in np.flatnonzero(nodes).tolist():
-            own = [face for face in touching.get(node, ()) if faces[face]]
-            normals = (given,) if given is not None else _smooth_normals(face_normals[own])
+            around = [face for face in touching.get(node, ()) if edge[face]]
+            normals = (given,) if given is not None else _smooth_normals(face_normals[around], faces[around])
             if not normals and condition.takes_normal:
                 raise SceneError(
                     f"conditions[{index}]",
@@ -198,39 +204,48 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
                     f"give normal=…",
                 )
             signatures[node].append((index, normals))
-    _refuse_free_and_moved(conditions, covered)
+    _refuse_shared_faces(mesh, conditions, covered)
     groups: dict[Signature, list[int]] = defaultdict(list)
     for node, signature in signatures.items():
         groups[tuple(signature)].append(node)
     return groups
 
 
-def _smooth_normals(normals: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged."""
-    clusters: list[list[np.ndarray]] = []
-    for normal in normals:
+def _smooth_normals(normals: np.ndarray, own: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged.
+
+    Only edges with a face of the condition's own count.
+    """
+    clusters: list[list[int]] = []
+    for face, normal in enumerate(normals):
         for cluster in clusters:
-            if normal @ cluster[0] > np.cos(SMOOTH_EDGE_ANGLE):
-                cluster.append(normal)
+            if normal @ normals[cluster[0]] > np.cos(SMOOTH_EDGE_ANGLE):
+                cluster.append(face)
                 break
         else:
-            clusters.append([normal])
-    means = [np.mean(cluster, axis=0) for cluster in clusters]
+            clusters.append([face])
+    means = [np.mean(normals[cluster], axis=0) for cluster in clusters if own[cluster].any()]
     return tuple(tuple(np.round(mean / np.linalg.norm(mean), 12).tolist()) for mean in means)
 
 
-def _refuse_free_and_moved(conditions: Sequence[Condition], covered: list[np.ndarray]) -> None:
-    for i, first in enumerate(conditions):
-        for j, second in enumerate(conditions):
-            if isinstance(first, Free) and not isinstance(second, Free):
-                shared = int((covered[i] & covered[j]).sum())
-                if shared:
-                    raise SceneError(
-                        f"conditions[{i}]",
-                        first,
-                        f"it shares {shared} boundary face(s) with conditions[{j}] = {second}, which moves or "
-                        f"holds them; a face is either free or moved",
-                    )
+def _refuse_shared_faces(mesh: Mesh, conditions: Sequence[Condition], covered: list[np.ndarray]) -> None:
+    """A face is either free or moved, and loaded by one condition at most."""
+    normals = mesh.face_normals()
+    for i, j in itertools.permutations(range(len(conditions)), 2):
+        first, second, shared = conditions[i], conditions[j], np.flatnonzero(covered[i] & covered[j])
+        if not len(shared):
+            continue
+        if isinstance(first, Free) and not isinstance(second, Free):
+            reason = "moves or holds them; a face is either free or moved"
+        elif first.tractions(mesh.nodes[mesh.faces[shared[0]]], normals[shared[0]]):
+            reason = "is on them as well; a face that is loaded has one condition"
+        else:
+            continue
+        raise SceneError(
+            f"conditions[{i}]",
+            first,
+            f"it shares {len(shared)} boundary face(s) with conditions[{j}] = {second}, which {reason}",
+        )
 
 
 def _refuse_contradiction(directions, rows, signature, conditions, points) -> None:
