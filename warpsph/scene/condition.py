@@ -1,9 +1,10 @@
 """Boundary conditions on selections of nodes.
 
-Every condition prescribes, direction by direction, either the velocity or the traction. A `Free` edge
-prescribes all tractions (zero); `Fixed` all velocities (zero); a `Roller` the normal velocity and the
-tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and zero traction
-along the others. What happens where conditions meet is in `warpsph.scene.resolve`.
+Every condition prescribes, direction by direction, either the velocity (`rows`) or the traction (`tractions`, zero
+unless it says so). A `Free` edge prescribes all tractions; `Fixed` all velocities (zero); a `Roller` the normal
+velocity and the tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and
+zero traction along the others. What happens where conditions meet is in `warpsph.scene.resolve`, how to add one in
+docs/conditions.md.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from .selection import Selection
 # One prescribed direction at every selected node: the unit vectors (k, d), and the target velocity along them
 # as a sum of terms, each a coefficient a node (k,) times a function of time.
 Row = tuple[np.ndarray, list[tuple[np.ndarray, TimeFunction]]]
+# A part of the traction on a face: a vector a node (k, d) times a function of time.
+Term = tuple[np.ndarray, TimeFunction]
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,18 @@ class Condition:
             normal: one of the nodes' outward normals, shape (d,), or None when they have none.
         """
         raise NotImplementedError
+
+    def tractions(self, points: np.ndarray, normal: np.ndarray) -> list[Term]:
+        """Prescribed traction σ n [Pa] at nodes that share one outward normal, a sum of terms; zero without any.
+
+        It is a force on the present area, whose direction in space stays when the face turns. It is prescribed
+        along the directions in which no condition prescribes the velocity.
+
+        Args:
+            points: initial positions of the nodes [m], shape (k, d).
+            normal: their outward normal n, shape (d,).
+        """
+        return []
 
     def check(self, dim: int) -> None:
         """Raise `SceneError` when the condition does not fit `dim` space dimensions."""
@@ -169,7 +184,7 @@ class Rotating(Condition):
 
 @dataclass(frozen=True)
 class Free(EdgeCondition):
-    """A traction-free edge: σ n = 0, with the initial outward normal n.
+    """A traction-free edge: σ n = 0. Nobody moves it; a subclass may load it by its `tractions`.
 
     Args:
         on: the nodes.

@@ -41,9 +41,18 @@ class Stepper:
         self._sources = sources(scene, self.body.law, self.body.parameters, space, launcher)
         if scene.free_surface is None:
             turns = scheme.unloads and scene.large_displacements and space.dim > 1
-            self.conditions = Conditions(scene.boundary, len(scene.mesh.nodes), space, launcher, self.clock, turns)
+            self.conditions = Conditions(
+                scene.boundary,
+                len(scene.mesh.nodes),
+                space=space,
+                launcher=launcher,
+                clock=self.clock,
+                turns=turns,
+            )
         else:
-            self.conditions = FreeSurfaceConditions(scene, self.body.nodes, space, launcher, self.clock)
+            self.conditions = FreeSurfaceConditions(
+                scene, self.body.nodes, space=space, launcher=launcher, clock=self.clock
+            )
         self.fluxes = scheme.fluxes(
             self.body,
             conditions=self.conditions,
