@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import json
 import re
 import shlex
 import sys
@@ -14,6 +15,7 @@ from warpsph.cli.main import _parser, main
 from warpsph.cli.stored import StoredScene, tomllib
 
 sys.path.insert(0, str(ROOT / "tools"))
+import cell_picture
 import tables
 
 
@@ -149,3 +151,29 @@ def test_places_of_the_docs_that_the_code_refers_to_exist():
         for path in (ROOT / folder).rglob("*.py"):
             for page, anchor in re.findall(r"\b((?:docs/)?\w+\.md)#([\w-]+)", path.read_text(encoding="utf-8")):
                 assert anchor in anchors(ROOT / page), f"{path.relative_to(ROOT)}: {page}#{anchor}"
+
+
+def test_what_a_run_writes_is_in_the_docs(tmp_path):
+    """Its files, the keys of its summary, the tables of its scene as data."""
+    assert (
+        main(["run", "elastic_bar", "--until", "1e-3", "--device", "cpu", "--quiet", "--out", str(tmp_path)]) == 0
+    )
+    words = set(re.findall(r"`([^`\n]+)`", (ROOT / "docs" / "output.md").read_text(encoding="utf-8")))
+    files = {path.name + "/" * path.is_dir() for path in tmp_path.iterdir()}
+    keys = set(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")))
+    scene = tomllib.loads((tmp_path / "scene.toml").read_text(encoding="utf-8"))
+    asked = {"run": scene["run"], "code": scene["code"]}
+    for found in (files, keys, {f"[{name}]" for name in asked}, *asked.values()):
+        assert set(found) - words == set()
+
+
+def test_the_picture_of_a_cell_can_be_made_again(tmp_path, monkeypatch):
+    """With all that it says; where its lines run is up to matplotlib."""
+    kept, path = cell_picture.PATH.read_text(encoding="utf-8"), tmp_path / "cell.svg"
+    monkeypatch.setattr(cell_picture, "PATH", path)
+    assert cell_picture.main() == 0
+    said = [
+        re.findall(r"<text[^>]*>(.*?)</text>", text, re.DOTALL)
+        for text in (kept, path.read_text(encoding="utf-8"))
+    ]
+    assert said[0] == said[1] and len(said[0]) > 5
