@@ -1,4 +1,7 @@
-"""What surrounds a body, to be drawn: the boundary faces that conditions hold or move, as boxes or quads."""
+"""What surrounds a body, to be drawn: the boundary faces that conditions hold or move, as boxes or quads.
+
+A condition acts on nodes and has no shape; a viewer shows why the body does not fall by the faces it acts on.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ class Wall:
 
     Attributes:
         name: kind of the condition and the edges it is on, e.g. `roller_left`.
-        faces: indices of the boundary faces of the lattice, shape (k,).
+        faces: indices of the boundary faces of the mesh, shape (k,).
         still: whether it never moves.
     """
 
