@@ -223,7 +223,8 @@ def test_a_fingerprint_sees_the_values_of_functions_of_position(maxwell):
     def layered(slope):
         return replace(scene, material=kind(profile=lambda x, y: slope * y, **vars(scene.material)))
 
-    prints = [fingerprint(layered(slope)) for slope in (1.0, 1.0, 2.0)]
+    scenes = [layered(slope) for slope in (1.0, 1.0, 2.0)]  # all alive: no function takes another's address
+    prints = [fingerprint(each) for each in scenes]
     assert prints[0] == prints[1] != prints[2]
 
 
