@@ -43,9 +43,9 @@ class Unknowns:
             return values[wp.static(start) : wp.static(end)]
 
         @wp.func
-        def replace(values: self.phi, new: block):
+        def replace(values: self.phi, value: block):
             result = values
-            result[wp.static(start) : wp.static(end)] = new
+            result[wp.static(start) : wp.static(end)] = value
             return result
 
         @wp.func
