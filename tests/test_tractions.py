@@ -186,7 +186,7 @@ def test_velocities_beat_tractions(traction):
 
 
 def test_where_a_load_ends_its_last_node_has_the_mean(traction):
-    """The trapezoidal rule then gives the force of the load, 6 Pa over half a metre. So with shears at a corner."""
+    """The trapezoidal rule then gives the force of the load, 6 Pa on half a metre. So with shears at a corner."""
     load = traction(edge("top") & where(lambda x, y: x <= 0.5), traction=(0.0, -6.0))
     plate = Resolved(load, Free(edge("top") & where(lambda x, y: x >= 0.5)))
     for x, pressure in ((0.0, -6.0), (0.25, -6.0), (0.5, -3.0), (0.75, 0.0)):

@@ -203,6 +203,6 @@ def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None,
             sigma, own = advance_stress(sigma, own, nodes.velocity_gradient[i], material, half)
             if wp.static(remembers):
                 internals[i] = own
-        nodes.point[i].phi = space.phi.join(v, sigma)
+        nodes.point[i].phi = space.phi.with_stress(space.phi.with_velocity(point.phi, v), sigma)
 
     return source_half_step

@@ -59,16 +59,5 @@ class Unknowns:
 @cache
 def unknowns(continuum: Continuum, precision: Precision) -> Unknowns:
     """φ = (v [m/s], σ [Pa]) of one continuum in one precision."""
-    dim = continuum.dim
-    phi = Unknowns(dim, precision, (("velocity", dim), ("stress", continuum.stress_size)))
-    vector, stress_vector = precision.vec(dim), precision.vec(continuum.stress_size)
-
-    @wp.func
-    def join(v: vector, sigma: stress_vector):
-        values = phi.phi()
-        values[: wp.static(dim)] = v
-        values[wp.static(dim) :] = sigma
-        return values
-
-    phi.join = join
-    return phi
+    blocks = (("velocity", continuum.dim), ("stress", continuum.stress_size))
+    return Unknowns(continuum.dim, precision, blocks)

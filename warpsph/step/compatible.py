@@ -160,8 +160,10 @@ def _to_auxiliary_kernel(
             rough = space.stress.elastic_rate(L - smooth, material.lame, material.shear, material.young)
             elastic = real(0.5) * dt * rough
             flowed, _ = law.relax(space.phi.stress(half) - elastic, mean, material, real(0.5) * dt)
-            half = space.phi.join(space.phi.velocity(half), flowed + elastic)
-        auxiliary.point[a].phi = half - phi + space.phi.join(types.vector(), space.stress.spherical(q))
+            half = space.phi.with_stress(half, flowed + elastic)
+        change = half - phi
+        pushed = space.phi.stress(change) + space.stress.spherical(q)
+        auxiliary.point[a].phi = space.phi.with_stress(change, pushed)
         means.store.write(a, cell, cells)
 
     return to_auxiliary
@@ -210,7 +212,8 @@ def _to_nodes_kernel(
         phi_adv = point.phi + dt * minus_div_f  # 10
         v_adv = phi.velocity(phi_adv) - real(VELOCITY_SHARE) * phi.velocity(checkerboard)
         lost = damped(phi.stress(checkerboard), nodes.velocity_gradient[i], material.shear, dt)
-        nodes.point[i].phi = phi.join(v_adv, phi.stress(phi_adv) - lost)
+        phi_adv = phi.with_stress(phi_adv, phi.stress(phi_adv) - lost)
+        nodes.point[i].phi = phi.with_velocity(phi_adv, v_adv)
         nodes.half_velocity[i] = phi.velocity(phi_half)
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
 

@@ -157,7 +157,7 @@ def _to_nodes_kernel(
         v_half = phi.velocity(phi_half)
         sigma_adv = phi.stress(point.phi) + dt * phi.stress(minus_div_f)  # 10a
         v_adv = advance_velocity(phi.velocity(point.phi), v_half, phi.velocity(minus_div_f), dt)  # 10b
-        nodes.point[i].phi = phi.join(v_adv, sigma_adv)
+        nodes.point[i].phi = phi.with_stress(phi.with_velocity(point.phi, v_adv), sigma_adv)
         nodes.half_velocity[i] = v_half
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
 
