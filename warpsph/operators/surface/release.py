@@ -140,11 +140,12 @@ def free_surface_types(space: Space, walls: ConditionTypes) -> ConditionTypes:
 
 def _unloading(scene: Scene) -> list[float]:
     """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
-    material, dim = scene.material, scene.mesh.dim
+    continuum = scene.mesh.continuum
     if not scene.numerics.scheme.unloads:
-        return [0.0] * (dim + 1)
-    lame, shear = material.lame_modulus, material.shear_modulus
-    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, dim + 1))]
+        return [0.0] * (continuum.dim + 1)
+    stiffness, k = scene.material.stiffness(continuum), continuum.pairs.index((0, 1))
+    lame, shear = float(stiffness[0, 1]), float(stiffness[k, k])
+    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, continuum.dim + 1))]
 
 
 @cache
