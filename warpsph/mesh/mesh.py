@@ -55,6 +55,11 @@ class Mesh:
             raise SceneError("cells", f"{corners} corners in {self.dim}D", known)
         return KINDS[self.dim, corners]
 
+    @property
+    def middle(self) -> np.ndarray:
+        """The middle of the box that holds it [m], shape (d,)."""
+        return 0.5 * (self.nodes.min(axis=0) + self.nodes.max(axis=0))
+
     def with_nodes(self, nodes: np.ndarray) -> Mesh:
         """The same mesh with its nodes elsewhere."""
         return replace(self, nodes=nodes)
@@ -103,9 +108,12 @@ class Mesh:
         corners = self.nodes[self.cells]
         return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
 
-    def smallest_edge(self) -> float:
-        """Shortest distance across a cell between the middles of opposite faces [m]."""
-        return float(np.linalg.norm(self.cell_jacobians(), axis=1).min())
+    def smallest_distance(self) -> float:
+        """Least distance across a cell [m]: the least singular value of its edges, which a wave sees.
+
+        In a cell that leans it is less than the distance between the middles of opposite faces.
+        """
+        return float(np.linalg.svd(self.cell_jacobians(), compute_uv=False).min())
 
     def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.

@@ -30,6 +30,9 @@ from ..state.cells import CellStore, NodeCells, cell_store, corner_place
 # A cell with less than this share of the volume of a box with edges as long has folded: it has no frame, and its
 # modes are taken as they are.
 FOLDED = 0.05
+# Towards the corners of a cell n times as long as high the strain rate is taken by no more than 2.2/n, since
+# `corner_share` balances square cells: with more, waves in flat ones grow (tests/test_hard_cases.py).
+FLATTEST = 2.2
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,17 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
     packed_points = packed(wp.array(dtype=types.Point))
 
     @wp.func
+    def flatness(frame: types.tensor):
+        """Least over largest distance across a cell, from |∇ξ_a|; 1 for a folded one."""
+        least, most = wp.length_sq(frame[0]), wp.length_sq(frame[0])
+        for b in range(1, wp.static(space.dim)):
+            least = wp.min(least, wp.length_sq(frame[b]))
+            most = wp.max(most, wp.length_sq(frame[b]))
+        if most <= space.real(0.0):
+            return space.real(1.0)
+        return wp.sqrt(least / most)
+
+    @wp.func
     def gather(
         i: int,
         table: NodeCells,
@@ -185,7 +199,8 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
                     gradient += cell.gradient
                     frame += cell.frame
                     if wp.static(len(kind.modes) > 0):
-                        beyond += cell.modes[: wp.static(space.dim)] * (mode_slopes(side[k], share) * cell.frame)
+                        own = wp.min(share, space.real(FLATTEST) * flatness(cell.frame))
+                        beyond += cell.modes[: wp.static(space.dim)] * (mode_slopes(side[k], own) * cell.frame)
                         checkerboard += cell.modes * sign[k]
         for row in range(wp.static(space.dim)):
             gradient[row] += beyond[row]

@@ -13,7 +13,7 @@ from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.resolve import BoundaryTable
-from ..state.clock import END, Clock
+from ..state.clock import END, NON_FINITE, Clock
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Conditions:
 
     def apply(self, nodes) -> None:
         """Step 13: impose the conditions at the end of the step on the nodes, in place; note values not finite."""
-        inputs = [self.table, nodes, self._clock.non_finite]
+        inputs = [self.table, nodes, self._clock.faults]
         self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
@@ -145,7 +145,7 @@ def apply_kernel(space: Space, conditions: ConditionTypes):
         first: int,
         table: conditions.Table,
         nodes: space.types.MaterialNodes,
-        non_finite: wp.array(dtype=wp.int32),
+        faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
         phi = conditions.apply(i, nodes.point[i].phi, END, table)
@@ -153,7 +153,7 @@ def apply_kernel(space: Space, conditions: ConditionTypes):
         u = nodes.displacement[i]
         # A NaN position is nobody's neighbour, so that it would never show in φ.
         if not wp.isfinite(wp.dot(phi, phi) + wp.dot(u, u)):
-            non_finite[0] = 1
+            faults[NON_FINITE] = 1
 
     return apply_conditions
 
