@@ -2,12 +2,12 @@
 
 The velocity's sources (b − c v) and the stress's (flow, spin) do not touch each other: each is integrated apart.
 A step damps and pushes, makes its waves, pushes and damps. What the pushes add, the waves of a body at rest take
-away again: v = 0 stays v = 0 and the ground carries the weight, damped or not. Damped and pushed in one flow at both
-ends, as published, a body at rest settles for ever. Damping is e^{−cΔt/2}, a push ∫ b dt by Simpson's rule: a fall
-is exact without damping and of second order with it. The stress is integrated by the scheme of choice:
+away again: v = 0 stays v = 0 and the ground carries the weight, damped or not. Damped and pushed in one flow at
+both ends, as published, a body at rest settles for ever. Damping is e^{−cΔt/2}, a push ∫ b dt by Simpson's rule:
+a fall is exact without damping, of second order with it. The stress is integrated by the scheme of choice:
 
-- `rk4`: the same, sub-stepped node by node so that λ Δt stays below `STIFFNESS_LIMIT`, λ being the rate at which
-  flow relaxes the stress there;
+- `rk4`: the classical fourth-order Runge-Kutta scheme, sub-stepped node by node so that λ Δt stays below
+  `STIFFNESS_LIMIT`, λ being the rate at which flow relaxes the stress there;
 - `analytic`: the rotation exp(ω Δt) and the law's own solution. Flow is isotropic, so the two commute, and there
   is no limit to the step: γ → ∞ gives rate-independent plasticity.
 """
