@@ -139,7 +139,7 @@ class Scene:
             if isinstance(condition, Free):
                 allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
-        if not len(surface.candidates(self.mesh, self.boundary)):
+        if not len(surface.candidates(self.mesh, self.conditions)):
             raise SceneError(
                 "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
             )

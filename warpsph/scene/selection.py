@@ -42,7 +42,8 @@ class Selection:
 class edge(Selection):  # noqa: N801 - written as a word in scenes
     """The nodes of a named edge: left, right, bottom, top, in 3D also front and back; `boundary` is all.
 
-    Names refer to the axes of the lattice before it was rotated or mapped.
+    A name stands for the end of the lattice on that side, before it was rotated or mapped. Steps, notches and
+    holes in between belong to `boundary` only: the slope of a bank is no part of its right edge.
 
     >>> from warpsph import Box
     >>> edge("left").nodes(Box((1.0,), 0.5).mesh())
