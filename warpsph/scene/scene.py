@@ -130,6 +130,7 @@ class Scene:
         scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
         scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
+        self.output.check(self.mesh, self.duration)
         _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
-from ..validate import choice, field_of_position, index, vector
+from ..validate import choice, index, mask_of_position, vector
 
 
 class Selection:
@@ -36,6 +36,10 @@ class Selection:
 
     def __invert__(self) -> Selection:
         return Outside(self)
+
+    def __bool__(self) -> bool:
+        """Refused: Python's `and`, `or` and `not` would give one of the selections and forget the other."""
+        raise SceneError("selection", self, "selections combine with &, | and ~, not with and, or and not")
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,7 @@ class where(Selection):  # noqa: N801
         extent = max(np.abs(mesh.nodes).max(), mesh.spacing)
         decimals = 12 - int(np.ceil(np.log10(extent)))
         points = np.round(mesh.nodes, decimals)
-        return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
+        return mask_of_position("where", self.function, points)
 
 
 @dataclass(frozen=True, eq=False)
