@@ -327,7 +327,7 @@ def test_candidates_end_at_the_walls():
     """The free edges with their ends, which lie on walls as well; no other node of a wall."""
     walls = [Roller(edge("left")), Fixed(edge("bottom"))]
     scene = plane(conditions=walls, free_surface=FreeSurface())
-    candidates = scene.free_surface.candidates(scene.mesh, scene.boundary)
+    candidates = scene.free_surface.candidates(scene.mesh, scene.conditions)
     x = scene.mesh.nodes
     assert candidates.tolist() == np.flatnonzero(np.isclose(x, 1.0).any(axis=1)).tolist()
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.mesh import Mesh
+from ..mesh.mesh import NO_SIDE, Mesh
 from ..scene.condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from ..scene.scene import Scene
 
@@ -44,8 +44,10 @@ def walls_of(scene: Scene) -> tuple[Wall, ...]:
 
 
 def _name(condition: Condition, mesh: Mesh, faces: np.ndarray) -> str:
-    sides = [mesh.continuum.edges[side] for side in np.unique(mesh.face_side[faces])]
-    return "_".join([KINDS.get(type(condition), "held"), *(sides if len(sides) < len(KINDS) else ["edge"])])
+    sides = np.unique(mesh.face_side[faces]).tolist()
+    named = NO_SIDE not in sides and len(sides) < len(KINDS)
+    names = [mesh.continuum.edges[side] for side in sides] if named else ["edge"]
+    return "_".join([KINDS.get(type(condition), "held"), *names])
 
 
 def _unused(name: str, taken: Sequence[str]) -> str:

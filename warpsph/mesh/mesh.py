@@ -11,6 +11,8 @@ from ..errors import SceneError, one_of
 from .continuum import CONTINUA, Continuum
 from .kinds import KINDS, CellKind
 
+NO_SIDE = -1
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -22,7 +24,8 @@ class Mesh:
         cells: node indices of each cell in the order of its kind's corners, shape (m, c).
         faces: node indices of each boundary face, in the order of the face's kind, shape (f, …).
         face_cell: the cell each face belongs to, shape (f,).
-        face_side: 2·axis for the low side of an axis of the grid, 2·axis + 1 for the high side, shape (f,).
+        face_side: 2·axis where the grid ends at the low side of an axis, 2·axis + 1 at the high side, `NO_SIDE` at
+            steps, notches and holes in between, shape (f,).
     """
 
     spacing: float

@@ -77,7 +77,8 @@ def edges_function(space: Space, kind: CellKind) -> wp.Function:
     def edges_of(a: int, auxiliary: space.types.AuxiliaryNodes, nodes: wp.array(dtype=space.types.Point)):
         edges = space.types.tensor()
         for k in range(wp.static(kind.corners)):
-            edges += wp.outer(nodes[auxiliary.cell[a, k]].x, slope[k])
+            i = auxiliary.cell[a, k]
+            edges += wp.outer(nodes[i].x, slope[k])
         return edges
 
     return edges_of

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
+from ..mesh.mesh import Mesh
+from ..mesh.reentrant import reentrant_nodes
 from ..validate import TimeFunction, instance, number, time_function, vector
 from .selection import Selection
 
@@ -38,6 +40,10 @@ class Condition:
     def takes_normal(self) -> bool:
         """Whether the condition has no meaning without an outward normal."""
         return False
+
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        """Which nodes the condition holds at, boolean, shape (n,)."""
+        return self.on.nodes(mesh)
 
     def rows(self, points: np.ndarray, normal: np.ndarray | None) -> list[Row]:
         """Prescribed velocity directions at nodes that share one outward normal.
@@ -186,10 +192,17 @@ class Rotating(Condition):
 class Free(EdgeCondition):
     """A traction-free edge: σ n = 0. Nobody moves it; a subclass may load it by its `tractions`.
 
+    Where the edge turns inwards, as in the corner of a notch or of a step, the node has more than half a space of
+    material around it and keeps its stress: both of its normals would take all of that away.
+
     Args:
         on: the nodes.
         normal: the edge's normal; that of the boundary faces unless given.
     """
+
+    def nodes(self, mesh):
+        nodes = self.on.nodes(mesh)
+        return nodes & ~reentrant_nodes(mesh) if self.normal is None else nodes
 
     def rows(self, points, normal):
         return []

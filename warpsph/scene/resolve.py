@@ -12,7 +12,8 @@ identity or Dₑ, G N = D Nᵀ (N D Nᵀ)⁻¹ N = 1 − Π. Where conditions me
 
 - a velocity condition beats a traction condition: a free edge frees only the directions that nobody moves;
 - a wall without friction keeps its zero shear at its ends as well, as a plane of symmetry does;
-- where two free edges meet, all in-plane stresses vanish (this follows from the two normals);
+- where two free edges meet, all in-plane stresses vanish (this follows from the two normals), but none in an inner
+  corner (see `Free`);
 - where tractions contradict each other, as at the end of a load, their mean holds;
 - two conditions that give one direction different velocities, that call one face free and moved, or that load one
   face twice, contradict each other and are refused.
@@ -193,7 +194,7 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         covered.append(faces & nodes[mesh.faces].all(axis=1))
         given = getattr(condition, "normal", None)
         edge = unmoved if isinstance(condition, Free) else faces
-        for node in np.flatnonzero(nodes).tolist():
+        for node in np.flatnonzero(condition.nodes(mesh)).tolist():
             around = [face for face in touching.get(node, ()) if edge[face]]
             normals = (given,) if given is not None else _smooth_normals(face_normals[around], faces[around])
             if not normals and condition.takes_normal:

@@ -164,9 +164,10 @@ def _to_auxiliary_kernel(
         if wp.static(law.flows):
             mean, smooth = internal(), types.tensor()
             for k in range(wp.static(kind.corners)):
+                i = auxiliary.cell[a, k]
                 if wp.static(len(law.internals) > 0):
-                    mean += internals[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
-                smooth += nodes.velocity_gradient[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
+                    mean += internals[i] / real(wp.static(kind.corners))
+                smooth += nodes.velocity_gradient[i] / real(wp.static(kind.corners))
             rough = space.stress.elastic_rate(L - smooth, material.lame, material.shear, material.young)
             elastic = real(0.5) * dt * rough
             flowed, _ = law.relax(space.phi.stress(half) - elastic, mean, material, real(0.5) * dt)

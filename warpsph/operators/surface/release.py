@@ -51,7 +51,7 @@ class FreeSurfaceConditions(Conditions):
         super().__init__(scene.boundary, len(mesh.nodes), space=space, launcher=launcher, clock=clock)
         self._unmoved = ~surface.moved(mesh, scene.boundary)
         self._moves = scene.large_displacements
-        candidates = surface.candidates(mesh, scene.boundary)
+        candidates = surface.candidates(mesh, scene.conditions)
         self._scan = SurfaceScan(scene, candidates, nodes=nodes, space=space, launcher=launcher)
         self.types = free_surface_types(space, self.types)
         walls, self.table = self.table, self.types.Table()
