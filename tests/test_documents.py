@@ -7,7 +7,8 @@ import pytest
 
 from tests.documents import LAW, PAGES, blocks, run_as_module
 from warpsph.cli.main import _parser, main
-from warpsph.cli.stored import StoredScene, tomllib
+from warpsph.cli.stored import StoredScene
+from warpsph.storage.reading import tomllib
 
 
 def everywhere(language):

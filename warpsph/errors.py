@@ -24,6 +24,10 @@ class SceneError(WarpSPHError, ValueError):
         super().__init__(" ".join(f"{field} = {_short(value)} is not allowed: {allowed}".split()))
 
 
+class DamagedError(SceneError):
+    """A file that a run has left can not be read: it is there, and nobody may act as if it were not."""
+
+
 class NonFiniteError(WarpSPHError, ArithmeticError):
     """A field became NaN or infinite during a run.
 

@@ -3,41 +3,45 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from .. import __version__
 from ..errors import SceneError, StoppedError
+from ..storage.names import printable
+from ..storage.owner import owned
 from . import new, sweep_command
 from .catalogue import load, shipped
 from .exporting import add_export
+from .parent import end_with_parent
 from .plotting import add_plot
 from .run_command import add_run
-from .runner import writable
+from .stopping import interrupting
+from .streams import steady_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; the exit status is 0 for success, 1 for a failed check or run, 2 for bad input."""
-    options = _parser().parse_args(arguments)
-    try:
-        return options.command(options)
-    except SceneError as error:
-        print(f"warpsph: {error}", file=sys.stderr)
-        return 2
-    except StoppedError as stop:
-        print(f"warpsph: {stop}", file=sys.stderr)
-        return stop.status
-    except KeyboardInterrupt:
-        print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # the reader of our output has gone, e.g. `warpsph list | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except OSError as error:  # a disk that is full, above all
-        print(f"warpsph: {error}", file=sys.stderr)
-        return 1
+    with steady_streams():
+        end_with_parent()
+        options = _parser().parse_args(arguments)
+        try:
+            for text in sys.argv[1:] if arguments is None else arguments:
+                printable("argument", text)
+            return options.command(options)
+        except SceneError as error:
+            print(f"warpsph: {error}", file=sys.stderr)
+            return 2
+        except StoppedError as stop:
+            print(f"warpsph: {stop}", file=sys.stderr)
+            return stop.status
+        except KeyboardInterrupt:
+            print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
+            return 130
+        except OSError as error:  # a disk that is full, above all
+            print(f"warpsph: {error}", file=sys.stderr)
+            return 1
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -96,12 +100,10 @@ def _report(options: argparse.Namespace) -> int:
     if options.jobs < 1:
         raise SceneError("--jobs", options.jobs, "it must be at least 1")
     default = Path("runs") / ("report-quick" if options.quick else "report")
-    folder = writable(Path(options.out or default))
+    folder = Path(options.out or default)
     try:
-        report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
-    except StoppedError as stop:
-        print(f"warpsph: {stop}", file=sys.stderr)
-        return stop.status
+        with owned(folder), interrupting():
+            report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
     except KeyboardInterrupt:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
         return 130

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from ..export.frames import Frames, FrameWriter
 from ..mesh.mesh import Mesh
 from ..scene.scene import Scene
 from ..simulation.history import read_history
+from ..simulation.summary import read_summary
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,6 @@ class Run(SceneRun):
     def make(self, folder: Path, device: str | None) -> None:
         """Run it; what it prints goes into `log.txt`."""
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").unlink(missing_ok=True)
         file, scene, values = self.build()
         with (
             (folder / "log.txt").open("w", encoding="utf-8") as log,
@@ -61,6 +60,7 @@ class Run(SceneRun):
                     Settings(device=device, frames=len(self.frames)),
                     folder,
                     quiet=False,
+                    overwrite=True,
                     watching=[lambda simulation: FrameWriter(simulation, self.frames, folder)],
                 )
             except SceneError as error:  # its checks could not be evaluated: the run keeps its summary
@@ -69,7 +69,7 @@ class Run(SceneRun):
     def read(self, folder: Path) -> Result:
         """What it gave."""
         history, _ = read_history(folder / "history.csv")
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_summary(folder / "summary.json")
         return Result(self, folder, summary, history, Frames(folder))
 
 
