@@ -30,32 +30,19 @@ TOE, CREST = (4.0, 0.0), (4.0, 2.0)
 
 NUMERICS = PUBLISHED
 SHORT = ("spacing=0.2", "duration=5")
+SOIL = PerzynaVonMises(young_modulus=8e7, poisson_ratio=0.3, density=2000.0, fluidity=1.0, yield_size=2e3)
 PARAMETERS = (
     Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),
     Parameter("duration", 35.0, "s", "simulated time"),
     Parameter("damping", 50.0, "1/s", "mass-proportional damping"),
-    Parameter("young_modulus", 8e7, "Pa", "Young's modulus"),
-    Parameter("poisson_ratio", 0.3, "-", "Poisson's ratio"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 1.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
-    Parameter("yield_size", 2e3, "Pa", "initial size of the von Mises surface Y0"),
-    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
+    *Parameter.of(SOIL),
 )
 
 
 def scene(p):
     return Scene(
         shape=Box(SIZE, p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            poisson_ratio=p.poisson_ratio,
-            density=p.density,
-            fluidity=p.fluidity,
-            exponent=p.exponent,
-            yield_size=p.yield_size,
-            hardening=p.hardening,
-        ),
+        material=SOIL.with_parameters(p),
         conditions=[Roller(edge("left")), Roller(edge("bottom"))],
         free_surface=FreeSurface(),
         body_force=BodyForce((0.0, -9.81), Ramp(1.0)),

@@ -21,9 +21,9 @@ from warpsph import (
     Parameter,
     Probe,
     Scene,
-    checkerboard_amplitude,
     edge,
 )
+from warpsph.analysis import checkerboard_amplitude
 
 SIZE = (0.2, 1.0)
 GRAVITY = 9.81  # [m/s²]

@@ -28,14 +28,12 @@ from warpsph import (
 LENGTH = 1.0  # [m]; the front does not reach the far end
 
 NUMERICS = {**PUBLISHED, "smoothing_ratio": 0.5}
+MATERIAL = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
 PARAMETERS = (
     Parameter("spacing", 0.01, "m", "distance between neighbouring nodes"),
     Parameter("velocity", 1.0, "m/s", "velocity v0 of the end"),
     Parameter("duration", 4e-3, "s", "simulated time"),
-    Parameter("young_modulus", 8e7, "Pa", "Young's modulus"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 1.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("yield_size", 2e5, "Pa", "uniaxial yield stress Y"),
+    *Parameter.of(MATERIAL, "young_modulus", "density", "fluidity", "yield_size"),
 )
 
 
@@ -55,12 +53,7 @@ def exact_stress(x, t, p):
 def scene(p):
     return Scene(
         shape=Box((LENGTH,), p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            density=p.density,
-            fluidity=p.fluidity,
-            yield_size=p.yield_size,
-        ),
+        material=MATERIAL.with_parameters(p),
         conditions=[Fixed(edge("left")), PrescribedVelocity(edge("right"), (p.velocity,))],
         duration=p.duration,
         large_displacements=False,

@@ -11,20 +11,8 @@ import math
 import numpy as np
 from _standard_sph import StandardSPH
 
-from warpsph import (
-    PUBLISHED,
-    Box,
-    Check,
-    Elastic,
-    Free,
-    Output,
-    Parameter,
-    Probe,
-    Scene,
-    checkerboard_amplitude,
-    edge,
-    smallest_distance,
-)
+from warpsph import PUBLISHED, Box, Check, Elastic, Free, Output, Parameter, Probe, Scene, edge
+from warpsph.analysis import checkerboard_amplitude, smallest_distance
 
 SIZE = (1.0, 0.5)  # unstretched [m]
 

@@ -25,12 +25,11 @@ from warpsph import (
     PrescribedVelocity,
     Probe,
     Roller,
-    Sampler,
     Scene,
     edge,
-    trace_ridge,
     where,
 )
+from warpsph.analysis import Sampler, trace_ridge
 
 HALF_WIDTH = 1.0  # of the footing [m]
 SIZE = (7.0, 3.0)
@@ -42,18 +41,12 @@ NEAREST, FARTHEST = 1.2, 3.0
 SMOOTHING = 0.3  # of the strain along a ray [m]
 
 NUMERICS = PUBLISHED
+SOIL = PerzynaVonMises(young_modulus=2.5e7, poisson_ratio=0.4, density=2000.0, fluidity=2.0, yield_size=15e3)
 PARAMETERS = (
     Parameter("spacing", 0.1, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-3, "m/s²", "rate at which the footing's velocity grows"),
     Parameter("duration", 3.2, "s", "simulated time"),
-    Parameter("young_modulus", 2.5e7, "Pa", "Young's modulus"),
-    Parameter("poisson_ratio", 0.4, "-", "Poisson's ratio"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
-    Parameter("yield_size", 15e3, "Pa", "initial size of the von Mises surface Y0"),
-    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
-    Parameter("residual_ratio", 0.1, "-", "softening ends at this share of Y0 (our choice)"),
+    *Parameter.of(SOIL),
 )
 
 
@@ -68,16 +61,7 @@ def scene(p):
     half_load = EdgeForce(footing, axis=1)
     return Scene(
         shape=Box(SIZE, p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            poisson_ratio=p.poisson_ratio,
-            density=p.density,
-            fluidity=p.fluidity,
-            exponent=p.exponent,
-            yield_size=p.yield_size,
-            hardening=p.hardening,
-            residual_ratio=p.residual_ratio,
-        ),
+        material=SOIL.with_parameters(p),
         conditions=[
             Roller(edge("left")),
             Roller(edge("right")),
@@ -90,7 +74,7 @@ def scene(p):
         output=Output(
             probes=(
                 Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node((0.0, SIZE[1])), 1]),
-                Probe("load", "N", lambda s: 2.0 * half_load(s)),
+                Probe("load", "N/m", lambda s: 2.0 * half_load(s)),
             ),
             curve=("settlement", "load"),
             curve_reference=("exact limit load", limit_load(p)),
@@ -101,7 +85,8 @@ def scene(p):
 
 def second_band(mesh, strain):
     """The curved band: where ε̄ (n,) is largest on each ray from the footing's edge, in initial positions."""
-    return trace_ridge(Sampler(mesh.nodes, mesh.cells, strain), EDGE, RAYS, NEAREST, FARTHEST, SMOOTHING)
+    strain_at = Sampler(mesh, strain)
+    return trace_ridge(strain_at, EDGE, angles=RAYS, nearest=NEAREST, farthest=FARTHEST, smoothing=SMOOTHING)
 
 
 def checks(run):
@@ -118,4 +103,4 @@ def checks(run):
         left = float(load[-1] / load.max())
         return [reaches, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
     plateau = settlement >= 0.6 * settlement[-1]
-    return [Check("limit_load", float(np.mean(load[plateau])), limit_load(p), "N", bound=0.03), reaches]
+    return [Check("limit_load", float(np.mean(load[plateau])), limit_load(p), "N/m", bound=0.03), reaches]

@@ -10,20 +10,8 @@ hourglassing by the checkerboard of the velocity, which needs no tension (`--set
 import numpy as np
 from _standard_sph import StandardSPH, alternating_growth_rate
 
-from warpsph import (
-    Box,
-    Check,
-    Elastic,
-    Fixed,
-    Output,
-    Parameter,
-    Probe,
-    Scene,
-    checkerboard_amplitude,
-    edge,
-    growth_rate,
-    smallest_distance,
-)
+from warpsph import Box, Check, Elastic, Fixed, Output, Parameter, Probe, Scene, edge
+from warpsph.analysis import checkerboard_amplitude, growth_rate, smallest_distance
 
 SIZE = 1.0  # [m]
 DISPLACED, KICK = 1e-4, 1e-3  # of the middle node: displacement over spacing, velocity [m/s]
@@ -98,7 +86,7 @@ def standard_sph(run_scene, p):
 
 def growth(history, p):
     """Growth rate of the disturbance [1/s], between 0.01 and 1 % of the spacing."""
-    return growth_rate(history["time"], history["departure"], 1e-4 * p.spacing, 1e-2 * p.spacing)
+    return growth_rate(history["time"], history["departure"], low=1e-4 * p.spacing, high=1e-2 * p.spacing)
 
 
 def checks(run):

@@ -28,9 +28,9 @@ from warpsph import (
     Roller,
     Scene,
     edge,
-    fit_band,
     where,
 )
+from warpsph.analysis import fit_band
 
 SIZE = (10.0, 10.0)
 WIDTH = 5.0  # of the footing [m]
@@ -38,18 +38,12 @@ MECHANISM = (0.05, 0.15)  # settlements between which the mechanism stands and t
 PAPER_STRAIN = 0.73  # largest ε̄ with H = 0
 
 NUMERICS = PUBLISHED
+SOIL = PerzynaVonMises(young_modulus=1e5, poisson_ratio=0.35, density=2000.0, fluidity=2.0, yield_size=200.0)
 PARAMETERS = (
     Parameter("spacing", 0.5, "m", "distance between neighbouring nodes"),
     Parameter("acceleration", 3e-5, "m/s²", "rate at which the footing's velocity grows"),
     Parameter("settlement", 0.45, "m", "settlement of the footing at the end"),
-    Parameter("young_modulus", 1e5, "Pa", "Young's modulus"),
-    Parameter("poisson_ratio", 0.35, "-", "Poisson's ratio"),
-    Parameter("density", 2000.0, "kg/m³", "density"),
-    Parameter("fluidity", 2.0, "1/s", "Perzyna fluidity γ"),
-    Parameter("exponent", 1.0, "-", "Perzyna exponent N"),
-    Parameter("yield_size", 200.0, "Pa", "initial size of the von Mises surface Y0"),
-    Parameter("hardening", 0.0, "Pa", "H = dY/dε̄; negative softens"),
-    Parameter("residual_ratio", 0.1, "-", "softening ends at this share of Y0 (our choice)"),
+    *Parameter.of(SOIL),
 )
 
 
@@ -63,16 +57,7 @@ def scene(p):
     beside = edge("top") & where(lambda x, y: x < SIZE[0] - WIDTH)
     return Scene(
         shape=Box(SIZE, p.spacing),
-        material=PerzynaVonMises(
-            young_modulus=p.young_modulus,
-            poisson_ratio=p.poisson_ratio,
-            density=p.density,
-            fluidity=p.fluidity,
-            exponent=p.exponent,
-            yield_size=p.yield_size,
-            hardening=p.hardening,
-            residual_ratio=p.residual_ratio,
-        ),
+        material=SOIL.with_parameters(p),
         conditions=[
             Roller(edge("left")),
             Fixed(edge("bottom")),
@@ -85,7 +70,7 @@ def scene(p):
         output=Output(
             probes=(
                 Probe("settlement", "m", lambda s: -s.field("displacement")[s.nearest_node(SIZE), 1]),
-                Probe("load", "N", EdgeForce(footing, axis=1)),
+                Probe("load", "N/m", EdgeForce(footing, axis=1)),
                 Probe("width", "m", lambda s: width(s.mesh, s.field("position"))),
             ),
             curve=("settlement", "load"),
@@ -120,8 +105,8 @@ def checks(run):
         return [angle, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
     formed = (settlement >= MECHANISM[0]) & (settlement <= MECHANISM[1])
     return [
-        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N", bound=0.10, bound_below=0.02),
-        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N", bound=0.10, bound_below=0.02),
+        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
+        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
         angle,
         Check("largest_strain", float(strain.max()), PAPER_STRAIN, "-", 0.20),
     ]

@@ -6,11 +6,8 @@ import pytest
 import warp as wp
 
 from tests.documents import LAW, ROOT, blocks, run_as_module
-from warpsph.materials import LAWS
-from warpsph.scene.document import types
+from warpsph.scene.registry import KERNELS, MATERIALS, SCHEMES, register
 from warpsph.simulation.device import start_warp
-
-MAXWELL = "warpsph.materials.maxwell"
 
 start_warp()
 
@@ -32,17 +29,27 @@ def precision(request):
     return request.param
 
 
+@pytest.fixture
+def registered():
+    """What a test registers is known to itself only."""
+    kept = [(table, dict(table)) for table in (MATERIALS, KERNELS, SCHEMES)]
+    yield
+    for table, rows in kept:
+        table.clear()
+        table.update(rows)
+
+
 @pytest.fixture(scope="session")
 def _maxwell_file(tmp_path_factory):
     block = next(block for block in blocks(ROOT / "docs/materials.md", "python") if block.startswith(LAW))
-    return run_as_module(MAXWELL, block, tmp_path_factory.mktemp("materials"))
+    module = run_as_module("maxwell", block, tmp_path_factory.mktemp("materials"))
+    del MATERIALS["Maxwell"], sys.modules["maxwell"]
+    return module
 
 
 @pytest.fixture
-def maxwell(_maxwell_file, monkeypatch):
-    """The material that docs/materials.md adds, as if its file and its row were there."""
-    monkeypatch.setitem(sys.modules, MAXWELL, _maxwell_file)
-    monkeypatch.setitem(LAWS, _maxwell_file.Maxwell, _maxwell_file.maxwell)
-    types.cache_clear()
-    yield _maxwell_file
-    types.cache_clear()
+def maxwell(_maxwell_file, registered, monkeypatch):
+    """The file of one's own that docs/materials.md adds a material by, imported."""
+    monkeypatch.setitem(sys.modules, "maxwell", _maxwell_file)
+    register(_maxwell_file.Maxwell)
+    return _maxwell_file

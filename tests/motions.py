@@ -54,12 +54,14 @@ def return_error(scene, precision="float64"):
     return np.linalg.norm(simulation.field("velocity") - start) / np.linalg.norm(start)
 
 
-CANTILEVER_PERIOD = 0.2552  # [s], METHOD section 4
+CANTILEVER_PERIOD = 0.2552  # [s], by Ritz: see test_cantilever_period
 
 
 def cantilever(across, periods, poisson_ratio=0.3975, **numerics):
-    """The cantilever of METHOD section 4, swinging freely from the velocity of its first mode (Euler,
-    Bernoulli)."""
+    """The cantilever of docs/velocity_steps.md#what-it-gives, swinging freely.
+
+    It starts with the velocity of its first mode (Euler, Bernoulli).
+    """
     length, height, amplitude = 0.2, 0.02, 0.01
     b = 1.8751040687 / length
     ratio = (np.cosh(b * length) + np.cos(b * length)) / (np.sinh(b * length) + np.sin(b * length))

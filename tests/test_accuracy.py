@@ -19,9 +19,9 @@ from warpsph import (
     Roller,
     Scene,
     Simulation,
-    checkerboard_amplitude,
     edge,
 )
+from warpsph.analysis import checkerboard_amplitude
 
 from .motions import (
     CANTILEVER_PERIOD,
@@ -93,7 +93,7 @@ def test_thin_cantilever_swings_with_its_period():
 @pytest.mark.long
 @pytest.mark.parametrize(("across", "bound", "periods"), [(10, 0.012, 2.1), (20, 0.005, 1.55)])
 def test_cantilever_period(across, bound, periods):
-    """METHOD section 4: the period within 1.2 % of 0.2552 s at 10 cells across, 0.5 % at 20; 97 % kept a period.
+    """The period within 1.2 % of 0.2552 s at 10 cells across, 0.5 % at 20; 97 % kept a period.
 
     Polynomials up to 28 × 10 (Ritz) give at least 0.25516 s and tend to 0.2553 s. Measured +0.95 % and
     +0.40 %; 98 and 99 % kept.
@@ -104,7 +104,7 @@ def test_cantilever_period(across, bound, periods):
 
 
 def test_hanging_bar_still_swings_after_fifty_periods():
-    """METHOD section 5, 20 cells long: amplitude ≥ 70 %, checkerboard ≤ 1 %, energy bounded and not growing.
+    """20 cells long: amplitude ≥ 70 %, checkerboard ≤ 1 %, energy bounded and not growing.
 
     Measured 82 %, 0.05 %; the energy, zero at the start, never rises above it and ends 11 % of the elastic maximum
     below. It swings about the static hang −ρ g L² (1 − ν²)/(2E), less what the clamp's width takes.
@@ -155,7 +155,7 @@ def test_hanging_bar_does_not_grow_in_a_million_steps():
     assert energies.kinetic[-1] <= 1e-9 * max(energies.kinetic)
 
 
-LENGTH, SPEED = 1.0, 200.0  # of the bar of METHOD section 5
+LENGTH, SPEED = 1.0, 200.0  # of a bar
 
 
 def bar_velocity(x, t):
@@ -170,7 +170,7 @@ def bar_velocity(x, t):
 
 
 def bar_error(numerics):
-    """Mean error of the velocity at x = 0.1 m (METHOD section 5) over ten passages.
+    """Mean error of the velocity at x = 0.1 m over ten passages.
 
     Pulled so slowly that the strain, 5·10⁻⁶, does not change the wave speed.
     """

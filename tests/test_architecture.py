@@ -1,6 +1,7 @@
 """Imports point one way: every room of the package only knows the rooms below it."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -32,10 +33,34 @@ def test_imports_point_down(path):
             assert ROOMS.index(room) <= own, f"{path.name} imports {room}"
 
 
-def test_scene_description_knows_no_warp():
-    for path in (PACKAGE / "scene").rglob("*.py"):
-        assert "import warp" not in path.read_text(encoding="utf-8"), path
+def imported_packages(path):
+    """Packages outside this one that a file imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module.split(".")[0]
+
+
+@pytest.mark.parametrize("room", ["mesh", "analysis", "scene"])
+def test_what_describes_and_measures_knows_no_warp(room):
+    for path in (PACKAGE / room).rglob("*.py"):
+        assert "warp" not in imported_packages(path), path
+
+
+def test_nothing_below_the_exports_draws():
+    """`matplotlib.tri` in analysis/sampling.py draws nothing: it finds the triangle that a point is in."""
+    below = [path for path in FILES if ROOMS.index(path.relative_to(PACKAGE).parts[0]) < ROOMS.index("export")]
+    drawing = [path.relative_to(PACKAGE).as_posix() for path in below if "matplotlib" in imported_packages(path)]
+    assert drawing == ["analysis/sampling.py"]
 
 
 def test_files_are_small_enough_for_one_purpose():
     assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 400 for path in FILES)
+
+
+def test_contributing_lists_the_rooms_in_their_order():
+    text = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`warpsph/[^|]*) \|", text, re.MULTILINE)
+    rooms = [room for row in rows for room in re.findall(r"`warpsph/(\w+)[./]", row)]
+    assert rooms == [*ROOMS, "frames"]

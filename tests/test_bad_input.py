@@ -39,7 +39,7 @@ from warpsph import (
     where,
 )
 from warpsph.scene import KERNELS
-from warpsph.scene.numerics import VELOCITY_SCHEMES
+from warpsph.scene.scheme import SCHEMES
 from warpsph.simulation.time_step import courant_limit, time_step_limit
 
 NAN, INF = math.nan, math.inf
@@ -165,7 +165,7 @@ SHAPES = [
     (lambda: Polygon([(0, 0), (1, 1), (1,)], 0.1), "vertices", "(1,)", "2 finite numbers"),
     (lambda: Polygon(3, 0.1), "vertices", 3, "three or more"),
     (lambda: Polygon([(0, 0), (1e12, 0), (2e12, 0)], 1.0), "spacing", 1.0, "fewer than"),
-    (lambda: scene(shape=Polygon([(0, 0), (1, 0), (0, 1)], 1.5)), "shape", "'no cell'", "whole cell"),
+    (lambda: scene(shape=Polygon([(0, 0), (1, 0), (0, 1)], 1.0)), "spacing", 1.0, "it must be finer"),
     (lambda: scene(shape="Box"), "shape", "'Box'", "a shape such as Box"),
     (lambda: scene(shape=Box), "shape", None, "a shape such as Box"),
     (lambda: PLATE.rotated(0.1, about=(1.0,)), "rotated.about", "(1.0,)", "2 finite numbers"),
@@ -355,7 +355,7 @@ def test_message_stays_one_line_when_a_user_function_raises_several():
 
 @pytest.mark.parametrize("shape", [Box((4.0,) * dim, 1.0) for dim in (1, 2, 3)], ids=["1D", "2D", "3D"])
 @pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("scheme", VELOCITY_SCHEMES)
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_support_must_reach_the_neighbours_of_a_corner_and_not_too_far(scheme, kernel, shape):
     """A corner node must see the auxiliary nodes beside its own: r² = (3/2)² + (d − 1)/4; in 1D one is enough. The
     compatible scheme's sums by parts end at √6.5 spacings."""

@@ -121,21 +121,22 @@ def test_phases_cover_the_step_and_leave_it_as_it_was():
     timed.step()
     plain.step()
     assert np.array_equal(timed.field("velocity"), plain.field("velocity"))
-    assert not any(name in vars(timed._stepper) for name in ("to_auxiliary", "to_nodes", "_build_lists"))
+    assert not any(name in vars(timed.stepper.fluxes) for name in ("to_auxiliary", "to_nodes"))
 
 
 def test_counts_of_a_bar_by_hand():
     """Five nodes, four auxiliary ones between them, lists within 2.05 spacings; elastic, so without sources."""
     simulation = small(1, "elastic")
     entries = 3 + 4 + 4 + 3 + 2 + 3 + 4 + 3 + 2
-    assert counting.pairs(simulation._stepper._around_nodes) == 2 + 3 + 4 + 3 + 2
+    assert counting.pairs(simulation.stepper.lists.around_nodes) == 2 + 3 + 4 + 3 + 2
     assert counting.flops_per_node_step(simulation) == pytest.approx((entries * 21 + 9 * 16) / 5)
     point, row = 3 * 8, 4
     moved = counting.bytes_per_node_step(simulation, timing.PHASES)
     assert moved["conditions"] == 2 * point + 8 + row
     assert "sources" not in timing.time_phases(simulation)
     assert counting.memory_per_node(simulation) > point + 3 * 8
-    cells = small(2)._stepper._fluxes._cells
+    body, cells = small(2).stepper.body, small(2).stepper.fluxes._cells
+    assert cells.size * 8 == 16 * 22 * 8, "22 numbers of each cell"
     found: dict[int, int] = {}
-    counting._collect_arrays(cells, found, set())
-    assert sum(found.values()) == 16 * 22 * 8 + 25 * 4 * 4, "22 numbers of each cell, four cells a node"
+    counting._collect_arrays(body.node_cells, found, set())
+    assert sum(found.values()) == (25 + 1 + 16 * 4) * 4, "the cells of 25 nodes, as 64 places in compressed rows"

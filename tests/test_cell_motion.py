@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warpsph import Box, Elastic, Numerics, Scene, Simulation
-from warpsph.operators.cell_motion import SMALLEST as SMALLEST_VOLUME
-from warpsph.operators.spacing import SMALLEST as SMALLEST_SPACING
+from warpsph.operators.cell_motion import LEAST_VOLUME_SHARE
+from warpsph.operators.spacing import LEAST_STEP_SHARE
 from warpsph.scene import KERNELS
 
 SOFT = Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0)
@@ -32,9 +32,9 @@ def simulation_of(dim, device, precision, cells=4, mapped=jitter, **numerics):
 
 def move(simulation, dt):
     """Step 14 alone."""
-    stepper = simulation._stepper
+    stepper = simulation.stepper
     stepper.clock.begin([0.0], dt)
-    stepper._motion.move(simulation.nodes, simulation.auxiliary, stepper.clock.time_step)
+    stepper.lists.motion.move(stepper.clock.time_step)
 
 
 def moved(simulation, F):
@@ -109,15 +109,15 @@ def edges_of(simulation):
 
 def missed_neighbours(simulation):
     """How many nodes, and cells, within a stretched support the pair lists do not hold."""
-    mesh, numerics, stepper = simulation.mesh, simulation.scene.numerics, simulation._stepper
+    mesh, numerics, stepper = simulation.mesh, simulation.scene.numerics, simulation.stepper
     reach = 0.999 * KERNELS[numerics.kernel].support * numerics.smoothing_ratio
     frames = np.linalg.inv(edges_of(simulation))
     of_nodes = [frames[(mesh.cells == i).any(axis=1)].mean(axis=0) for i in range(len(mesh.nodes))]
     nodes, cells = (part.point.numpy()["x"].astype(float) for part in (simulation.nodes, simulation.auxiliary))
     missed = 0
     for pairs, targets, sources, metrics in (
-        (stepper._around_auxiliary.pairs, cells, nodes, frames),
-        (stepper._around_nodes.pairs, nodes, cells, of_nodes),
+        (stepper.lists.around_auxiliary, cells, nodes, frames),
+        (stepper.lists.around_nodes, nodes, cells, of_nodes),
     ):
         start, index = pairs.start.numpy(), pairs.index.numpy()
         for i, metric in enumerate(metrics):
@@ -131,7 +131,7 @@ def missed_neighbours(simulation):
 def test_lists_hold_all_of_the_stretched_supports(device, dim, name):
     """The supports are ellipses, the lists are made for circles."""
     simulation = moved(simulation_of(dim, device, "float64"), MOTIONS[name](dim))
-    simulation._stepper._build_lists()
+    simulation.stepper.lists.refresh()
     assert missed_neighbours(simulation) == 0
 
 
@@ -156,7 +156,7 @@ def test_a_folded_cell_keeps_a_tenth_of_its_volume(device, precision):
     simulation.nodes.half_velocity.assign(velocity)
     move(simulation, 1.0)
     density = simulation.field("density")
-    assert density[corner] == pytest.approx(SOFT.density / SMALLEST_VOLUME, rel=ROUNDING[precision])
+    assert density[corner] == pytest.approx(SOFT.density / LEAST_VOLUME_SHARE, rel=ROUNDING[precision])
     assert np.isfinite(density).all() and density.min() >= SOFT.density * (1 - ROUNDING[precision])
 
 
@@ -166,9 +166,9 @@ def test_a_folded_cell_keeps_a_tenth_of_its_volume(device, precision):
 
 
 def shrinkage_after(simulation, F):
-    stepper = moved(simulation, F)._stepper
-    stepper._build_lists()
-    return stepper.shrinkage
+    stepper = moved(simulation, F).stepper
+    stepper.lists.refresh()
+    return stepper.lists.shrinkage
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])
@@ -185,7 +185,7 @@ def test_uniform_stretch_and_compression_change_the_step(device, precision, dim,
 @pytest.mark.parametrize("dim", [1, 2])
 def test_a_step_is_never_shorter_than_a_quarter(device, precision, dim):
     simulation = simulation_of(dim, device, precision)
-    assert shrinkage_after(simulation, np.diag([0.01, 1.0][:dim])) == SMALLEST_SPACING == 0.25
+    assert shrinkage_after(simulation, np.diag([0.01, 1.0][:dim])) == LEAST_STEP_SHARE == 0.25
 
 
 @pytest.mark.parametrize("name", MOTIONS)
@@ -194,7 +194,7 @@ def test_spacing_is_the_least_singular_value_of_the_edges_times_the_root_of_the_
     """Of every cell of a distorted lattice; the power method may be 0.3 % above, and never below."""
     simulation = simulation_of(dim, "cpu", precision)
     shrinkage_after(simulation, MOTIONS[name](dim))
-    spacing = 1.0 / simulation._stepper._motion._spacing._rate.numpy()
+    spacing = 1.0 / simulation.stepper.lists.motion._spacing._rate.numpy()
     edges = edges_of(simulation)
     density = SOFT.density * simulation.mesh.cell_volumes() / np.abs(np.linalg.det(edges))
     error = spacing / (np.linalg.svd(edges, compute_uv=False).min(axis=1) * np.sqrt(density)) - 1.0
@@ -222,5 +222,5 @@ def test_a_folded_cell_does_not_shorten_the_step(precision):
     velocity[corner] = (0.6, 0.6)
     simulation.nodes.half_velocity.assign(velocity)
     move(simulation, 1.0)
-    simulation._stepper._build_lists()
-    assert simulation._stepper.shrinkage == pytest.approx(1.0, rel=ROUNDING[precision])
+    simulation.stepper.lists.refresh()
+    assert simulation.stepper.lists.shrinkage == pytest.approx(1.0, rel=ROUNDING[precision])

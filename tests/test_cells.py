@@ -10,11 +10,13 @@ import warp as wp
 
 from warpsph import Box
 from warpsph.device.precision import PRECISIONS
-from warpsph.operators.cell_means import cell_types
+from warpsph.mesh.kinds import GRID_KINDS
+from warpsph.operators.cell_means import cell_means
 from warpsph.operators.front import ROUGH, front_pressure
-from warpsph.operators.neighbour_sums import sweep
+from warpsph.operators.neighbour_sums import cell_metric
 from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
+from warpsph.state.cells import NodeCells, node_cells
 
 DIMENSIONS = [1, 2, 3]
 ROUNDING = {"float64": 1e-13, "float32": 1e-4}
@@ -60,8 +62,7 @@ def probes(dim, precision):
     """Kernels that run `describe` on all cells and `gather` on all nodes."""
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
-    types, cell_of = space.types, cell_types(space)
-    describe, write, gather, Cells = cell_of.describe, cell_of.write, cell_of.gather, cell_of.Cells
+    types, means = space.types, cell_means(space, GRID_KINDS[dim])
     phi, phi_gradient, Point, AuxiliaryNodes = types.phi, types.phi_gradient, types.Point, types.AuxiliaryNodes
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -69,18 +70,19 @@ def probes(dim, precision):
         nodes: wp.array(dtype=Point),
         gradients: wp.array(dtype=phi_gradient),
         auxiliary: AuxiliaryNodes,
-        cells: Cells,
+        cells: wp.array2d(dtype=real.real),
     ):
         a = wp.tid()
-        mean, cell = describe(a, auxiliary, nodes)
+        mean, cell = means.describe(a, auxiliary, nodes)
         cell.gradient = gradients[a]
         auxiliary.point[a].phi = mean
-        write(a, cell, cells)
+        means.store.write(a, cell, cells)
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather_all(
         auxiliary: AuxiliaryNodes,
-        cells: Cells,
+        table: NodeCells,
+        cells: wp.array2d(dtype=real.real),
         share: real.real,
         values: wp.array(dtype=phi),
         gradients: wp.array(dtype=phi_gradient),
@@ -88,23 +90,24 @@ def probes(dim, precision):
         frames: wp.array(dtype=types.tensor),
     ):
         i = wp.tid()
-        value, gradient, checkerboard, frame = gather(i, cells, auxiliary.point, share)
+        value, gradient, checkerboard, frame = means.gather(i, table, cells, auxiliary.point, share)
         values[i] = value
         gradients[i] = gradient
         checkerboards[i] = checkerboard
         frames[i] = frame
 
-    return describe_all, gather_all, types, cell_of
+    return describe_all, gather_all, space, means
 
 
 def see(mesh, field, precision, middle_gradient=None, share=1.0):
     """Run both on node values (n, d + s) and gradients in the middle of the cells (m, d + s, d)."""
-    describe_all, gather_all, types, cell_of = probes(mesh.dim, precision)
+    describe_all, gather_all, space, means = probes(mesh.dim, precision)
+    types = space.types
     phi, phi_gradient, Point = types.phi, types.phi_gradient, types.Point
     n, m = len(mesh.nodes), len(mesh.cells)
     points = np.zeros(n, dtype=Point.numpy_dtype())
     points["x"], points["phi"] = mesh.nodes, field
-    auxiliary, cells = types.AuxiliaryNodes(), cell_of.new(mesh, "cpu")
+    auxiliary, cells = types.AuxiliaryNodes(), means.store.new(m, space, "cpu")
     auxiliary.point = wp.zeros(m, dtype=Point, device="cpu")
     auxiliary.cell = wp.array(mesh.cells, dtype=wp.int32, device="cpu")
     if middle_gradient is None:
@@ -115,9 +118,9 @@ def see(mesh, field, precision, middle_gradient=None, share=1.0):
     )
     written = (phi, phi_gradient, phi, types.tensor)
     outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
-    wp.launch(gather_all, n, [auxiliary, cells, share], outputs, device="cpu")
+    wp.launch(gather_all, n, [auxiliary, node_cells(mesh, "cpu"), cells, share], outputs, device="cpu")
     gradient, frame = types.size * mesh.dim, mesh.dim**2
-    modes = cells.numbers.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
+    modes = cells.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
 
 
@@ -253,7 +256,7 @@ def test_kernels_follow_the_frame_and_are_round_without_one(precision, dim):
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
     tensor = space.types.tensor
-    metric_of = sweep(space, "gaussian").cell_metric(0.6)
+    metric_of = cell_metric(space, 0.6)
 
     @wp.kernel(module="unique", enable_backward=False)
     def probe(frames: wp.array(dtype=tensor), h: real.real, metrics: wp.array(dtype=tensor)):
@@ -279,8 +282,8 @@ def pressure_probe(dim, precision):
     """A kernel that writes q of all cells."""
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
-    types, front = space.types, front_pressure(space)
-    describe, scalar = cell_types(space).describe, real.real
+    types, front = space.types, front_pressure(space, GRID_KINDS[dim])
+    describe, scalar = cell_means(space, GRID_KINDS[dim]).describe, real.real
     AuxiliaryNodes, MaterialNodes = types.AuxiliaryNodes, types.MaterialNodes
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -472,7 +472,7 @@ def test_new_pair_lists_find_the_surface_anew(device):
 
 
 def test_slope_under_gravity(device, precision):
-    """A collapsing slope (METHOD section 5, coarse): who is free stays the same while the face turns and flows.
+    """A coarse slope that collapses: who is free stays the same while the face turns and flows.
 
     The face's normals turn with it: it runs straight enough for the chord of its lower half to give its
     direction to a few degrees.

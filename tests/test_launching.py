@@ -118,17 +118,17 @@ def test_one_recording_serves_every_time_step(device):
     """Δt is on the device: steps of other lengths are replayed, as are those after lists were built in place."""
     replayed, made_one_by_one = (Simulation(pressed(), device, threads=1) for _ in range(2))
     replayed.step()
-    recording = replayed._stepper._recording
+    recording = replayed.stepper._recording
     for share in (1.0, 0.3, 0.7):
         replayed.step(share * replayed.time_step_limit)
-    replayed._stepper._build_lists()
+    replayed.stepper.lists.refresh()
     replayed.step()
-    assert replayed._stepper._recording is recording
+    assert replayed.stepper._recording is recording
 
-    made_one_by_one._stepper._record = lambda: SimpleNamespace(run=made_one_by_one._stepper.step)
+    made_one_by_one.stepper._record = lambda: SimpleNamespace(run=made_one_by_one.stepper.step)
     for share in (1.0, 1.0, 0.3, 0.7):
         made_one_by_one.step(share * made_one_by_one.time_step_limit)
-    made_one_by_one._stepper._build_lists()
+    made_one_by_one.stepper.lists.refresh()
     made_one_by_one.step()
     for name in STATE:
         assert np.array_equal(replayed.field(name), made_one_by_one.field(name)), name
@@ -174,8 +174,8 @@ def test_large_bodies_look_up_often(monkeypatch):
     """A signal waits for no more than `AHEAD_ON_CPU` node-steps."""
     simulation, made = Simulation(pressed(), device="cpu"), []
     monkeypatch.setattr(simulation_module, "AHEAD_ON_CPU", 5 * len(simulation.mesh.nodes))
-    advance = simulation._stepper.advance
-    monkeypatch.setattr(simulation._stepper, "advance", lambda *given: made.append(advance(*given)) or made[-1])
+    advance = simulation.stepper.advance
+    monkeypatch.setattr(simulation.stepper, "advance", lambda *given: made.append(advance(*given)) or made[-1])
     simulation.run()
     assert max(made)[0] == 5 and sum(outcome.made for outcome in made) == simulation.steps
 

@@ -7,17 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpsph import (
-    Box,
-    Check,
+from warpsph import Box, Check
+from warpsph.analysis import (
     Sampler,
+    band_profile,
+    checkerboard,
     checkerboard_amplitude,
     fit_band,
     growth_rate,
     smallest_distance,
+    split_cells,
     trace_ridge,
+    width_at_half,
 )
-from warpsph.analysis.measures import band_profile, checkerboard, split_cells, width_at_half
 
 
 def alternating(mesh):
@@ -61,8 +63,8 @@ def test_smallest_distance_is_that_of_all_pairs(n, seed):
 def test_growth_rate_of_an_exponential_that_starts_from_a_floor_and_saturates():
     t = np.linspace(0.0, 1.0, 2001)
     amplitude = np.minimum(1e-6 * np.sqrt(1.0 + np.exp(40.0 * t)), 1.0)  # rate 20 once the floor is passed
-    assert growth_rate(t, amplitude, 1e-4, 1e-1) == pytest.approx(20.0, rel=1e-3)
-    assert growth_rate(t, np.exp(-3.0 * t), 2.0, 5.0) == pytest.approx(-3.0, rel=1e-9)
+    assert growth_rate(t, amplitude, low=1e-4, high=1e-1) == pytest.approx(20.0, rel=1e-3)
+    assert growth_rate(t, np.exp(-3.0 * t), low=2.0, high=5.0) == pytest.approx(-3.0, rel=1e-9)
 
 
 def band_of(angle, half_width, half_length, cells=80):
@@ -94,7 +96,7 @@ def test_band_fit_ignores_a_single_crushed_node():
 def test_band_width_of_a_gaussian_profile(half_width):
     """Full width at half maximum 2 √(ln 2) w; linear interpolation between nodes adds up to Δx²/w² of it."""
     mesh, strain = band_of(-45.0, half_width, half_length=3.5)
-    across, profile = band_profile(Sampler(mesh.nodes, mesh.cells, strain), fit_band(mesh.nodes, strain), 2.0)
+    across, profile = band_profile(Sampler(mesh, strain), fit_band(mesh.nodes, strain), reach=2.0)
     expected = 2.0 * np.sqrt(np.log(2.0)) * half_width
     assert width_at_half(across, profile) == pytest.approx(expected, rel=(0.1 / half_width) ** 2)
 
@@ -107,7 +109,7 @@ def test_width_of_a_triangle_is_half_its_base_and_none_without_flanks():
 
 def test_sampler_is_exact_for_linear_fields_and_zero_outside():
     mesh = Box((1.0, 1.0), 0.25).rotated(0.4).mesh()
-    sample = Sampler(mesh.nodes, mesh.cells, 2.0 - 3.0 * mesh.nodes[:, 0] + mesh.nodes[:, 1])
+    sample = Sampler(mesh, 2.0 - 3.0 * mesh.nodes[:, 0] + mesh.nodes[:, 1])
     inside = mesh.nodes.mean(axis=0) + np.random.default_rng(2).uniform(-0.3, 0.3, size=(50, 2))
     np.testing.assert_allclose(sample(inside), 2.0 - 3.0 * inside[:, 0] + inside[:, 1], rtol=1e-12)
     assert not sample(np.array([[5.0, 5.0]])).any()
@@ -115,7 +117,7 @@ def test_sampler_is_exact_for_linear_fields_and_zero_outside():
 
 def test_cells_are_split_without_gap_or_overlap():
     mesh = Box((1.0, 0.5), 0.25).mapped(lambda x, y: (x + 0.2 * x * y, y - 0.1 * x)).mesh()
-    corners, triangles, values = split_cells(mesh.nodes, mesh.cells, alternating(mesh))
+    corners, triangles, values = split_cells(mesh, alternating(mesh))
     a, b, c = corners[triangles].transpose(1, 0, 2)
     areas = 0.5 * np.linalg.det(np.stack([b - a, c - a], axis=1))
     assert (np.abs(areas) > 0.0).all() and len(set(np.sign(areas))) == 1
@@ -130,12 +132,13 @@ def test_ridge_of_a_ring_and_its_gap(smoothing):
     away = mesh.nodes - 4.0
     strain = np.exp(-(((np.hypot(*away.T) - 2.0) / 0.3) ** 2))
     strain[np.abs(np.degrees(np.arctan2(away[:, 1], away[:, 0]))) < 20.0] = 0.0
-    sample = Sampler(mesh.nodes, mesh.cells, strain)
-    ring = trace_ridge(sample, (4.0, 4.0), np.arange(30.0, 331.0, 10.0), 1.0, 3.5, smoothing)
+    sample = Sampler(mesh, strain)
+    along = {"nearest": 1.0, "farthest": 3.5, "smoothing": smoothing}
+    ring = trace_ridge(sample, (4.0, 4.0), angles=np.arange(30.0, 331.0, 10.0), **along)
     np.testing.assert_allclose(ring.radius, 2.0, atol=0.05)
     np.testing.assert_allclose(np.linalg.norm(ring.points - 4.0, axis=1), ring.radius, rtol=1e-12)
     assert (ring.strain > 0.9).all()
-    assert trace_ridge(sample, (4.0, 4.0), np.array([0.0]), 1.0, 3.5, smoothing).strain < 1e-12
+    assert trace_ridge(sample, (4.0, 4.0), angles=np.array([0.0]), **along).strain < 1e-12
 
 
 @pytest.mark.parametrize(("value", "passed"), [(97.0, False), (98.5, True), (109.0, True), (111.0, False)])

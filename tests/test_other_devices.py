@@ -7,9 +7,11 @@ import warp as wp
 from tests.test_launching import SCENES, STATE, pressed
 from warpsph import Numerics, Simulation
 from warpsph.device.arrays import ALIGNMENT
+from warpsph.operators.conditions import Conditions
 from warpsph.operators.neighbour_sums import GPU_BATCH
+from warpsph.operators.surface.release import FreeSurfaceConditions
 from warpsph.simulation.state import slots
-from warpsph.step import compatible, published, step
+from warpsph.step import compatible, lists, published, step
 
 HOPPER = 90  # compute capability 9.0
 
@@ -19,7 +21,7 @@ def as_on_a_gpu(monkeypatch):
     """Simulations made now have the kernels and the layout of a GPU, wherever they run."""
     monkeypatch.setattr(compatible, "batch_on", lambda device: GPU_BATCH)
     monkeypatch.setattr(published, "batch_on", lambda device: GPU_BATCH)
-    monkeypatch.setattr(compatible, "apart_on", lambda device: True)
+    monkeypatch.setattr(compatible, "numbers_side_by_side", lambda device: True)
 
 
 @pytest.mark.skipif(HOPPER not in wp.get_cuda_supported_archs(), reason="this Warp can not compile for CUDA")
@@ -27,8 +29,10 @@ def as_on_a_gpu(monkeypatch):
 def test_all_kernels_compile_for_cuda(as_on_a_gpu, name, precision, monkeypatch, tmp_path):
     """To machine code, which needs no driver."""
     kernels = []
-    monkeypatch.setattr(step, "load_kernels", lambda of_step, device: kernels.extend(of_step))
-    monkeypatch.setattr(step.Stepper, "_build_lists", lambda self: None)
+    for module in (step, lists):
+        monkeypatch.setattr(module, "load_kernels", lambda of_step, device: kernels.extend(of_step))
+    for part in (lists.PairLists, Conditions, FreeSurfaceConditions):
+        monkeypatch.setattr(part, "refresh", lambda self: None)
     monkeypatch.setattr(step.Stepper, "_initial_spin", lambda self, scene: None)
     Simulation(SCENES[name](), "cpu", precision)
     modules = {kernel.module for kernel in kernels}
@@ -60,7 +64,7 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
     first.run(0.05)
     restored.restore(*first.state())
     told_of = ("nodes.", "auxiliary.", "_around", "_motion._of_node", "_fluxes._cells")
-    every = (slot for slot in slots(restored._stepper) if isinstance(slot.value, wp.array))
+    every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}
     assert len(arrays) > 20
     for path, array in arrays.items():

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from warpsph.cli.main import main
-from warpsph.cli.member import Member, said
+from warpsph.cli.member import Member, last_line
 from warpsph.cli.sweep import members
 from warpsph.errors import SceneError
 
@@ -207,7 +207,7 @@ def test_dask_that_is_not_installed_is_said(bar, capsys, monkeypatch):
 
 
 def test_member_without_a_log_says_so(tmp_path):
-    assert said(tmp_path) == "it left no log"
+    assert last_line(tmp_path) == "it left no log"
     with pytest.raises(SceneError):
         members("no_such_scene", [], "float64")
 

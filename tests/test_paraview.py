@@ -8,7 +8,7 @@ import pytest
 
 from warpsph import Box, Elastic, FreeSurface, PrescribedVelocity, Scene, Simulation, edge
 from warpsph.cli.main import main
-from warpsph.export.frames import Frames, FrameWriter, evenly
+from warpsph.frames import Frames, FrameWriter, evenly
 
 # Stress components in VTK's order XX, YY, ZZ, XY, YZ, XZ; one number each that can not be mistaken.
 STRESS = {1: (1.0,), 2: (1.0, 2.0, 12.0, 3.0), 3: (1.0, 2.0, 3.0, 12.0, 13.0, 23.0)}

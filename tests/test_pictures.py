@@ -7,10 +7,10 @@ import pytest
 from PIL import Image
 
 from warpsph.cli.main import main
-from warpsph.export import pictures
-from warpsph.export.frames import Frames
+from warpsph.export.pictures.field import MOVIES
+from warpsph.export.pictures.view import View
 from warpsph.export.quantity import quantity
-from warpsph.export.view import View
+from warpsph.frames import Frames
 
 FRAMES = 6
 
@@ -98,7 +98,7 @@ def test_bad_input_exits_with_2_and_one_line(options, message, run, capsys):
 
 
 def test_mp4_without_ffmpeg_is_refused_in_one_line(run, monkeypatch, capsys):
-    monkeypatch.setattr(pictures.MOVIES["mp4"], "isAvailable", classmethod(lambda cls: False))
+    monkeypatch.setattr(MOVIES["mp4"], "isAvailable", classmethod(lambda cls: False))
     assert main(["plot", str(run), "--animate", "mp4"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "it needs ffmpeg" in error

@@ -1,4 +1,4 @@
-"""The report's parts: runs that are kept, frames, cases that can be told, and pages that stand alone."""
+"""The report's parts: runs that are kept, frames, sections that can be made, and pages that stand alone."""
 
 import re
 from html.parser import HTMLParser
@@ -9,7 +9,7 @@ import pytest
 from warpsph.cli import scene_run
 from warpsph.cli.main import main
 from warpsph.cli.queue import make_missing, processes
-from warpsph.report.case import Picture, Row, Section, Table
+from warpsph.report.case import Picture, ReportTable, Row, Section
 from warpsph.report.cases import cases, elastic_bar, hanging_bar, wavy_surface
 from warpsph.report.drawing import Curve, diagram
 from warpsph.report.page import write_html, write_markdown
@@ -89,7 +89,7 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
     assert "non-finite" in result.summary["error"]
     assert len(result.times) == 2, "the frame at 10 ms was never reached"
     section = Section(Prose("t", "x", ()), [Row("q", 1.0)], [], [result])
-    write_markdown(tmp_path / "r.md", "title", [], [section])
+    write_markdown(tmp_path / "r.md", [section], title="title", lead=[])
     assert "broke down" in (tmp_path / "r.md").read_text()
 
 
@@ -127,13 +127,13 @@ def test_wavy_surface_runs_both_normals_and_every_body():
 
 
 @pytest.mark.parametrize("module", [hanging_bar, elastic_bar, wavy_surface])
-def test_short_cases_are_told(module, tmp_path):
+def test_short_cases_are_words(module, tmp_path):
     """From the runs to the section: figures drawn, every difference has its paragraph."""
     case = module.case(quick=True)
     for run in case.runs:
         run.make(tmp_path / run.name, "cpu")
     results = {run.name: run.read(tmp_path / run.name) for run in case.runs}
-    section = case.tell(results, lambda name: tmp_path / f"{name}.png")
+    section = case.section(results, lambda name: tmp_path / f"{name}.png")
     assert all(picture.path.stat().st_size > 10_000 for picture in section.pictures)
     assert section.rows and section.prose.differences
     if module is hanging_bar:
@@ -160,8 +160,8 @@ def test_difference_is_to_the_exact_value_else_to_the_paper_s():
 @pytest.mark.parametrize("path", sorted(TEXTS.glob("*.md")), ids=lambda path: path.stem)
 def test_prose_has_a_title_and_a_text(path):
     places = dict.fromkeys(re.findall(r"{(\w+)", path.read_text(encoding="utf-8")), 1.0)
-    told = prose(path.stem, **places)
-    assert told.title and not told.title.startswith("#") and told.text
+    words = prose(path.stem, **places)
+    assert words.title and not words.title.startswith("#") and words.text
 
 
 class Elements(HTMLParser):
@@ -186,19 +186,25 @@ class Elements(HTMLParser):
 @pytest.fixture
 def section(tmp_path):
     path = diagram(
-        tmp_path / "a.png", [Curve("a < b", [0, 1], [0, 1]), Curve("exact", [0, 1], [1, 1], exact=True)], "x", "y"
+        tmp_path / "a.png",
+        [Curve("a < b", [0, 1], [0, 1]), Curve("exact", [0, 1], [1, 1], exact=True)],
+        x_label="x",
+        y_label="y",
     )
     return Section(
         prose=Prose("Title & more", "Text with `code`.", ("**First** <difference>.", "Second.")),
-        rows=[Row("load | sum", 91473.7, "N", 90650.0, 89055.0, 6.23), Row("words", "broke down")],
+        rows=[
+            Row("load | sum", 91473.7, unit="N", paper=90650.0, exact=89055.0, seconds=6.23),
+            Row("words", "broke down"),
+        ],
         pictures=[Picture(path, 'A "caption"')],
         results=[],
-        tables=[Table("Three:", ("", "a", "b"), [("line", 1.0, None)])],
+        tables=[ReportTable("Three:", ("", "a", "b"), [("line", 1.0, None)])],
     )
 
 
 def test_html_page_stands_alone(section, tmp_path):
-    write_html(tmp_path / "r.html", "Report", ["Lead."], [section])
+    write_html(tmp_path / "r.html", [section], title="Report", lead=["Lead."])
     elements = Elements()
     elements.feed((tmp_path / "r.html").read_text(encoding="utf-8"))
     assert elements.open == []
@@ -210,7 +216,7 @@ def test_html_page_stands_alone(section, tmp_path):
 
 
 def test_markdown_refers_to_its_pictures_and_keeps_its_tables(section, tmp_path):
-    write_markdown(tmp_path / "r.md", "Report", ["Lead."], [section])
+    write_markdown(tmp_path / "r.md", [section], title="Report", lead=["Lead."])
     lines = (tmp_path / "r.md").read_text(encoding="utf-8").splitlines()
     assert '![A "caption"](a.png)' in lines
     (row,) = (line for line in lines if line.startswith("| load"))

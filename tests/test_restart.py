@@ -149,7 +149,7 @@ def assert_same(one, other):
     found = []
     for simulation in (one, other):
         held = {}
-        holdings(simulation._stepper, "", set(), held)
+        holdings(simulation.stepper, "", set(), held)
         found.append(held)
     first, second = found
     assert first.keys() == second.keys() and len(first) > 30
@@ -213,7 +213,7 @@ def test_no_array_of_the_stepper_is_left_out(name, tmp_path):
         simulation.run(observers=[StoppingAt(20)])
     write_checkpoint(simulation, tmp_path / "checkpoint.npz", history)
     other = Simulation(SCENES[name](), device="cpu")
-    assert len(poison(other._stepper)) > 20
+    assert len(poison(other.stepper)) > 20
     Checkpoint.read(tmp_path / "checkpoint.npz").restore(other)
     assert_same(simulation, other)
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 
-from warpsph import Frames
 from warpsph.cli.main import main
+from warpsph.frames import Frames
 from warpsph.simulation.checkpoint import Checkpoint
 from warpsph.storage.reading import read_toml
 

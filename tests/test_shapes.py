@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpsph import Box, Disc, Polygon
+from warpsph import Box, Disc, Polygon, SceneError
+from warpsph.mesh.lattice import hinges, parts
 from warpsph.scene import CONTINUA
 
 BAR = Box((1.0,), 0.1)
@@ -112,7 +113,7 @@ def test_disc_is_the_cells_whose_centre_is_inside():
     assert points(mesh.nodes[mesh.cells].mean(axis=1) - centre) == inside
 
 
-@pytest.mark.parametrize("spacing", [0.25, 0.3, 0.4, 0.7])
+@pytest.mark.parametrize("spacing", [0.25, 0.3, 0.4, 0.45])
 def test_disc_looks_the_same_after_a_quarter_turn(spacing):
     nodes = Disc(1.0, spacing, centre=(3.0, -1.0)).mesh().nodes - [3.0, -1.0]
     assert points(nodes) == points(nodes @ [[0.0, 1.0], [-1.0, 0.0]])
@@ -142,6 +143,131 @@ def test_triangle_keeps_cells_whose_centre_is_inside():
     centres = mesh.nodes[mesh.cells].mean(axis=1)
     grid = (np.indices((16, 8)).reshape(2, -1).T + 0.5) * 0.125
     assert points(centres) == points(grid[grid[:, 0] + 2.0 * grid[:, 1] < 2.0])
+
+
+def cells_of(vertices, spacing):
+    """Middles of a polygon's cells, in hundredths of the spacing."""
+    mesh = Polygon(vertices, spacing).mesh()
+    return {
+        tuple(row) for row in np.rint(100.0 / spacing * mesh.nodes[mesh.cells].mean(axis=1)).astype(int).tolist()
+    }
+
+
+BANK = [(0, 0), (4, 0), (3, 1), (1, 1)]  # its sides, at 45°, go through the middles of cells
+
+
+@pytest.mark.parametrize("spacing", [1 / 3, 0.25, 0.2, 0.1, 0.05])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.3, -0.7), (1e5 / 7, 1e6 / 3)])
+def test_bank_is_symmetric_wherever_it_stands(spacing, place):
+    """Each row has two cells less than the one below; none of those whose middle lies on the outline is there."""
+    mesh = Polygon(np.array(BANK) + place, spacing).mesh()
+    middles = mesh.nodes[mesh.cells].mean(axis=1) - place
+    rows, counts = np.unique(np.rint(middles[:, 1] / spacing - 0.5), return_counts=True)
+    wide = round(4 / spacing)
+    assert counts.tolist() == [wide - 2 * (k + 1) for k in range(round(1 / spacing))], rows
+    assert middles[:, 0].mean() == pytest.approx(2.0, abs=1e-9)
+
+
+LENGTHS = st.integers(-12, 12).map(lambda k: k / 10)
+SIMPLE = st.lists(st.tuples(LENGTHS, LENGTHS), min_size=3, max_size=7, unique=True)
+MOVES = {
+    "mirrored": lambda x, y: (-x, y),
+    "upside down": lambda x, y: (x, -y),
+    "quarter turn": lambda x, y: (-y, x),
+    "across the diagonal": lambda x, y: (y, x),
+}
+
+
+@settings(max_examples=300, deadline=None)
+@given(SIMPLE, st.sampled_from([0.1, 0.2, 0.05, 0.15]), st.sampled_from(list(MOVES)), st.integers(0, 6))
+def test_moved_polygon_gives_the_moved_body(vertices, spacing, name, first):
+    """Whatever side comes first, and which way round; sides at 45° and others go through middles of cells."""
+    try:
+        cells = cells_of(vertices, spacing)
+    except SceneError:
+        return
+    moved = [MOVES[name](x, y) for x, y in vertices]
+    moved = moved[first % len(moved) :] + moved[: first % len(moved)]
+    assert cells_of(moved, spacing) == {MOVES[name](*cell) for cell in cells}
+    assert cells_of(moved[::-1], spacing) == cells_of(moved, spacing)
+
+
+def test_lattice_lines_go_through_the_sides_along_the_axes():
+    """A corner lower than the lowest side along the axes, at 0.1: the lattice reaches below it from there."""
+    mesh = Polygon([(0, 0.1), (0.5, -0.17), (1, 0.1), (1, 1), (0, 1)], 0.1).mesh()
+    assert np.allclose(np.unique(np.round(mesh.nodes[:, 1], 9)), np.arange(-1, 11) / 10)
+    assert (mesh.nodes[:, 0].min(), mesh.nodes[:, 0].max(), mesh.nodes[:, 1].max()) == (0.0, 1.0, 1.0)
+
+
+def test_lattice_is_in_the_middle_where_no_side_is_along_the_axes():
+    mesh = Polygon([(0, 0.3), (1.1, 0), (1.4, 1.1), (0.3, 1.4)], 0.15).mesh()
+    assert (mesh.nodes[:, 0].min() + mesh.nodes[:, 0].max()) / 2 == pytest.approx(0.7, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "spacing", "field", "said"),
+    [
+        ([(0, 0), (1, 0), (1, 1), (0, 1)], 0.3, "spacing", "x = 0 and 1 m must be a whole number of spacings"),
+        ([(0, 0), (1, 0), (1, 1), (0, 1)], 1.9, "spacing", "for example 1"),
+        ([(0, 0), (2, 0), (2, 0.55), (1, 0.55), (1, 2), (0, 2)], 0.1, "spacing", "y = 0 and 0.55 m"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1, "vertices", "(1.0, 1.0) and from (1.0, 0.0)"),
+        ([(0, 0), (2, 0), (2, 1), (1, 0), (0, 1)], 0.1, "vertices", "meet"),  # a corner on another side
+        ([(0, 0), (2, 0), (1, 0), (1, 1), (0, 1)], 0.1, "vertices", "meet"),  # forth and back
+        ([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)], 0.1, "vertices", "(0.0, 0.0) stands twice"),
+        ([(0, 0), (1, 0), (1, 0), (1, 1), (0, 1)], 0.1, "vertices", "(1.0, 0.0) stands twice"),
+        ([(0, 0), (1, 0), (2, 0)], 0.1, "vertices", "meet"),
+        ([(0, 0), (3, 2), (3, 2.3), (0, 0.3)], 0.2, "spacing", "share a corner and no side"),
+        ([(0, 0), (0.9, 0.3), (1.2, 1.2), (0.3, 0.9)], 0.1, "spacing", "near (0.1, 0.1)"),
+        (
+            [(0, 0), (3, 3), (3, 3.3), (0, 0.3)],
+            0.2,
+            "spacing",
+            "finer: the cells have 0.6 m² in all, the shape 0.9",
+        ),
+    ],
+)
+def test_polygon_that_a_lattice_can_not_hold_is_refused(vertices, spacing, field, said):
+    with pytest.raises(SceneError) as caught:
+        Polygon(vertices, spacing).mesh()
+    assert caught.value.field == field and said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_disc_of_too_few_cells_is_refused():
+    """Nine cells 0.7 m wide are 4.41 m²; the disc is π m²."""
+    with pytest.raises(SceneError, match=r"4\.41 m² in all, the shape 3\.142 m²"):
+        Disc(1.0, 0.7).mesh()
+
+
+@pytest.mark.parametrize(("thick", "cells"), [(0.2, 2 * 25 + 5), (0.04, None)])
+def test_body_in_two_parts_is_refused(thick, cells):
+    """Two blocks on a beam a cell thick, or so thin that it holds no cell's middle."""
+    upper = [(2, 1), (2, 0.4 + thick), (1, 0.4 + 0.9 * thick), (1, 1), (0, 1)]
+    shape = Polygon([(0, 0), (1, 0), (1, 0.4), (2, 0.4), (2, 0), (3, 0), (3, 1), *upper], 0.2)
+    if cells:
+        assert len(shape.mesh().cells) == cells
+    else:
+        with pytest.raises(SceneError, match="fall apart"):
+            shape.mesh()
+
+
+@pytest.mark.parametrize(
+    ("rows", "hinged", "count"),
+    [
+        (["11", "11"], 0, 1),
+        (["10", "01"], 1, 2),
+        (["101", "111"], 0, 1),
+        (["101", "101"], 0, 2),
+        (["1110111", "1000001", "1111111"], 0, 1),
+        (["1110111", "1000001", "1110111"], 0, 2),
+        (["11111", "00001", "11101", "10001", "11111"], 0, 1),
+        (["111", "101", "110"], 1, 1),
+    ],
+)
+def test_hinges_and_parts_of_cells(rows, hinged, count):
+    kept = np.array([[letter == "1" for letter in row] for row in rows])
+    for turned in (kept, kept.T, kept[::-1], kept[:, ::-1]):
+        assert (len(hinges(turned)), parts(turned)) == (hinged, count)
+    assert hinged == 0 or hinges(kept).tolist() == ([[1, 1]] if count == 2 else [[2, 2]])
 
 
 @pytest.mark.parametrize("shape", [PLATE, BLOCK, ELL])

@@ -7,7 +7,7 @@ import warp as wp
 from warpsph import BodyForce, Box, Elastic, Fixed, Numerics, PerzynaVonMises, Scene, Simulation, everywhere
 from warpsph.device.linear_algebra import rotation_of
 from warpsph.device.precision import PRECISIONS
-from warpsph.physics.stress import stress_functions
+from warpsph.physics.space import Space
 from warpsph.scene import BAR, PLANE_STRAIN, SOLID
 
 STRESS = {1: (3e5,), 2: (3e5, -1e5, 5e4, 2e4), 3: (3e5, -1e5, 2e4, 5e4, -4e4, 6e4)}
@@ -224,46 +224,45 @@ def test_damping_and_a_ramped_body_force_follow_their_ode():
 
 
 def evaluate(continuum, precision, L, sigma, gradient, q, moduli):
-    """All functions of a continuum's kinematics at one point, from a kernel; outputs poisoned."""
-    real, d, s = PRECISIONS[precision], continuum.dim, continuum.stress_size
-    kin = stress_functions(continuum, real)
-    elastic_rate, divergence, spin = kin.elastic_rate, kin.divergence, kin.spin
-    von_mises, relaxation = kin.von_mises, kin.relaxation
-    stress, vector, scalar = real.vec(s), real.vec(d), real.real
-    tensor_type, gradient_type = real.mat(d, d), real.mat(s, d)
+    """All functions of a continuum's stresses at one point, from a kernel; outputs poisoned."""
+    space = Space(continuum, PRECISIONS[precision])
+    types, scalar = space.types, space.real
 
     @wp.kernel(module="unique", enable_backward=False)
     def probe(
-        L: tensor_type,
-        sigma: stress,
-        gradient: gradient_type,
+        L: types.tensor,
+        sigma: types.stress,
+        gradient: types.stress_gradient,
         q: scalar,
         lame: scalar,
         shear: scalar,
         young: scalar,
-        stresses: wp.array(dtype=stress),
-        divergences: wp.array(dtype=vector),
+        stresses: wp.array(dtype=types.stress),
+        divergences: wp.array(dtype=types.vector),
         invariants: wp.array(dtype=scalar),
     ):
-        stresses[0] = elastic_rate(L, lame, shear, young)
-        stresses[1] = spin(sigma, L)
-        stresses[2] = relaxation(sigma, q, shear, young)
-        divergences[0] = divergence(gradient)
-        invariants[0] = von_mises(sigma)
+        stresses[0] = space.stress.elastic_rate(L, lame, shear, young)
+        stresses[1] = space.stress.spin(sigma, L)
+        stresses[2] = space.stress.relaxation(sigma, q, shear, young)
+        stresses[3] = space.stress.deviator(sigma)
+        divergences[0] = space.stress.divergence(gradient)
+        invariants[0] = space.stress.von_mises(sigma)
+        invariants[1] = space.stress.mean(sigma)
+        invariants[2] = space.stress.relaxation_modulus(shear, young)
 
     outputs = [
-        wp.full(3, stress(np.nan), dtype=stress, device="cpu"),
-        wp.full(1, vector(np.nan), dtype=vector, device="cpu"),
-        wp.full(1, np.nan, dtype=scalar, device="cpu"),
+        wp.full(4, types.stress(np.nan), dtype=types.stress, device="cpu"),
+        wp.full(1, types.vector(np.nan), dtype=types.vector, device="cpu"),
+        wp.full(3, np.nan, dtype=scalar, device="cpu"),
     ]
-    inputs = [tensor_type(L), stress(sigma), gradient_type(gradient), q, *moduli]
+    inputs = [types.tensor(L), types.stress(sigma), types.stress_gradient(gradient), q, *moduli]
     wp.launch(probe, 1, inputs=inputs, outputs=outputs, device="cpu")
     return [output.numpy() for output in outputs]
 
 
 @pytest.mark.parametrize("continuum", [BAR, PLANE_STRAIN, SOLID], ids=lambda c: c.name)
-def test_kinematics_agree_with_three_by_three_tensors(continuum, precision):
-    """Elastic rate, spin, von Mises stress, relaxation and divergence, from random L, σ and ∇σ."""
+def test_functions_of_stresses_agree_with_three_by_three_tensors(continuum, precision):
+    """Rate, spin, deviator, invariants, relaxation and divergence, from random L, σ and ∇σ."""
     rng = np.random.default_rng(7)
     d, s = continuum.dim, continuum.stress_size
     L, sigma, gradient = rng.normal(size=(d, d)), rng.normal(size=s), rng.normal(size=(s, d))
@@ -272,16 +271,18 @@ def test_kinematics_agree_with_three_by_three_tensors(continuum, precision):
     L3[:d, :d] = L
     strain_rate, spin = 0.5 * (L3 + L3.T), 0.5 * (L3 - L3.T)
     elastic = young * L3 if d == 1 else lame * np.trace(L3) * np.eye(3) + 2 * shear * strain_rate
-    q = q_of(full)
-    relaxation = (full * young if d == 1 else 3 * shear * (full - np.trace(full) / 3 * np.eye(3))) / q
+    q, mean = q_of(full), np.trace(full) / 3.0
+    deviator = full - mean * np.eye(3)
+    relaxation = (full * young if d == 1 else 3 * shear * deviator) / q
+    modulus = 1.5 * (relaxation * deviator).sum() / q  # ∂q/∂σ = 3/2 s/q on what relaxes
     divergence = [sum(gradient[_index(continuum, i, j), j] for j in range(d)) for i in range(d)]
 
     stresses, divergences, invariants = evaluate(continuum, precision, L, sigma, gradient, q, (lame, shear, young))
     tolerance = {"rtol": 1e-12, "atol": 1e-12} if precision == "float64" else {"rtol": 2e-5, "atol": 2e-6}
-    for actual, expected in zip(stresses, (elastic, spin @ full - full @ spin, relaxation), strict=True):
+    for actual, expected in zip(stresses, (elastic, spin @ full - full @ spin, relaxation, deviator), strict=True):
         np.testing.assert_allclose(actual, stored(expected, continuum), **tolerance)
     np.testing.assert_allclose(divergences[0], divergence, **tolerance)
-    np.testing.assert_allclose(invariants[0], q, **tolerance)
+    np.testing.assert_allclose(invariants, (q, mean, modulus), **tolerance)
 
 
 def _index(continuum, i, j):

@@ -8,7 +8,7 @@ import pytest
 
 from warpsph import Box, Elastic, Fixed, Free, Numerics, Roller, Scene, Simulation, edge
 from warpsph.mesh.continuum import CONTINUA
-from warpsph.scene.numerics import KERNELS
+from warpsph.scene import KERNELS
 from warpsph.simulation.time_step import courant_limit
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tools"))

@@ -7,34 +7,23 @@ import warp as wp
 from warpsph import Box, Disc, Elastic, Numerics, Scene, Simulation
 from warpsph.device.linear_algebra import symmetric_inverse
 from warpsph.device.precision import PRECISIONS
-from warpsph.materials import LAWS
-from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, sweep
+from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, neighbour_sums, round_metric
 from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
-from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
 from warpsph.physics.space import Space
-from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES
-from warpsph.scene.material import Elastic as ElasticMaterial
-from warpsph.scene.material import PerzynaVonMises
+from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES
 from warpsph.state.pairs import PairList
-from warpsph.step.fluxes import FLUXES
-from warpsph.step.published import PublishedFluxes
-from warpsph.step.velocity_schemes import VELOCITY_SCHEMES as PUBLISHED_VELOCITIES
 
 SOFT = Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0)
 
 
 def test_names_a_scene_may_use_are_those_that_exist_below():
-    assert set(KERNELS) == set(SMOOTHING_FUNCTIONS)
-    assert set(VELOCITY_SCHEMES) == set(FLUXES)
-    assert {name for name, fluxes in FLUXES.items() if fluxes is PublishedFluxes} == set(PUBLISHED_VELOCITIES)
     assert set(SOURCE_SCHEMES) == set(SOURCE_TABLE)
-    assert set(LAWS) == {ElasticMaterial, PerzynaVonMises}
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_second_weight_is_minus_the_derivative_over_xi(kernel):
     """−W′/ξ up to one constant for all ξ, by central differences (error h² W‴/6, 1e-6 here)."""
-    weight = SMOOTHING_FUNCTIONS[kernel](PRECISIONS["float64"])
+    weight = KERNELS[kernel].weights(PRECISIONS["float64"])
     ratios = []
     for xi in np.linspace(0.1, 0.98 * KERNELS[kernel].support, 17):
         if abs(xi - 1.0) < 0.05:  # the cubic spline's third derivative jumps
@@ -59,12 +48,12 @@ def test_pair_lists_hold_every_neighbour_once(device, precision, shape):
     for _ in range(12):
         simulation.step()
     assert simulation.list_builds > 1
-    stepper = simulation._stepper
-    for around, targets, sources in (
-        (stepper._around_nodes, stepper.nodes, stepper.auxiliary),
-        (stepper._around_auxiliary, stepper.auxiliary, stepper.nodes),
+    body, lists = simulation.stepper.body, simulation.stepper.lists
+    for pairs, targets, sources in (
+        (lists.around_nodes, body.nodes, body.auxiliary),
+        (lists.around_auxiliary, body.auxiliary, body.nodes),
     ):
-        start, index = around.pairs.start.numpy(), around.pairs.index.numpy()
+        start, index = pairs.start.numpy(), pairs.index.numpy()
         x, y = targets.point.numpy()["x"], sources.point.numpy()["x"]
         radius = KERNELS["gaussian"].support * targets.smoothing_length.numpy()
         for i in range(len(x)):
@@ -78,8 +67,8 @@ def probe_kernel(dim, precision, kernel, batch):
     """A kernel that writes the value and the gradient of one sweep."""
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
-    types, parts = space.types, sweep(space, kernel, batch)
-    collect, value, gradient, round_metric = parts.collect, parts.value, parts.gradient, parts.round_metric
+    types, parts = space.types, neighbour_sums(space, KERNELS[kernel], batch)
+    metric_of = round_metric(space)
     Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -95,9 +84,9 @@ def probe_kernel(dim, precision, kernel, batch):
         gradients: wp.array(dtype=matrix),
     ):
         i = wp.tid()
-        sums = collect(i, x[i], round_metric(h[i]), base, pairs, sources, volume)
-        values[i] = value(sums)
-        gradients[i] = gradient(sums, own[i])
+        sums = parts.collect(i, x[i], metric_of(h[i]), base, pairs, sources, volume)
+        values[i] = parts.value(sums)
+        gradients[i] = parts.gradient(sums, own[i])
 
     return probe, types
 
@@ -173,7 +162,7 @@ def test_nothing_depends_on_how_many_weights_are_found_at_a_time(kernel):
 def test_the_gaussian_is_one_as_far_as_it_reaches(precision):
     """Squared four times, so that rounding of the polynomial counts 16 times, in some ten operations each."""
     real = PRECISIONS[precision]
-    weights = SMOOTHING_FUNCTIONS["gaussian"](real)
+    weights = KERNELS["gaussian"].weights(real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def probe(s: wp.array(dtype=real.real), out: wp.array(dtype=real.real)):

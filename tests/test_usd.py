@@ -15,8 +15,8 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from warpsph.cli.main import main
-from warpsph.export.frames import Frames
 from warpsph.export.usd_live import LiveStage
+from warpsph.frames import Frames
 
 TOOL = Path(__file__).parent.parent / "tools" / "check_usd.py"
 SPACING, FRAMES = 0.1, 8

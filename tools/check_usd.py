@@ -112,7 +112,7 @@ def _extent(prim: Usd.Prim, code) -> Iterator[str]:
 
 
 def _against(stage: Usd.Stage, codes: list[float], run: Path) -> Iterator[str]:
-    from warpsph.export.frames import Frames
+    from warpsph.frames import Frames
 
     frames = Frames(run)
     root = stage.GetDefaultPrim()

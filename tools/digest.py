@@ -7,6 +7,10 @@ Every scheme, elastic and viscoplastic, in 1D, 2D and 3D, in both precisions, on
 free surfaces, turning edges, drives, body force, damping and both source schemes among them. A digest covers every
 bit of every field after so many steps, and how often the lists were built. A digest holds on one kind of machine
 and with one version of Warp only: make both files in one place.
+
+Kernels are compiled without fused multiplications and additions here. Which product of a·b + c·d is fused is the
+compiler's choice, made anew for every shape of the code around it: with it, digests of equal formulas differ.
+`--fused` compiles kernels as runs do.
 """
 
 from __future__ import annotations
@@ -38,8 +42,10 @@ from warpsph import (
     Simulation,
     edge,
 )
+from warpsph.device import compiling
 
 STEPS = 200
+EXACT_FLAGS = "-ffp-contract=off -mstackrealign"  # IEEE arithmetic as it is written
 SCHEMES = ("compatible", "blanc-pastor", "taylor")
 SPACING = {1: 0.005, 2: 0.0625, 3: 0.2}
 SOFT = {"young_modulus": 1e6, "poisson_ratio": 0.3, "density": 2000.0}
@@ -120,7 +126,10 @@ def main() -> int:
     parser.add_argument("--compare", type=Path, help="compare them with those in this JSON file")
     parser.add_argument("--steps", type=int, default=STEPS, help=f"steps a run (default {STEPS})")
     parser.add_argument("--only", default="", help="only scenes whose name holds this text")
+    parser.add_argument("--fused", action="store_true", help="compile kernels as runs do")
     options = parser.parse_args()
+    if not options.fused:
+        compiling.CPU_FLAGS = EXACT_FLAGS
     before = json.loads(options.compare.read_text(encoding="utf-8")) if options.compare else {}
     found: dict[str, str] = {}
     differ = 0

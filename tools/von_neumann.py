@@ -34,8 +34,9 @@ from warpsph.mesh.continuum import CONTINUA
 from warpsph.operators.checkerboard import STRESS_SHARE
 from warpsph.operators.front import STRENGTH
 from warpsph.operators.neighbour_sums import EDGE
-from warpsph.physics.smoothing import SMOOTHING_FUNCTIONS
-from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
+from warpsph.scene.numerics import Numerics
+from warpsph.scene.registry import KERNELS
+from warpsph.scene.scheme import SCHEMES
 from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
 COURANT = (0.3, 0.5, 0.8, 0.95)
@@ -48,7 +49,7 @@ LINES = (":", "-.", "--", "-")
 def neighbours(dim: int, kernel: str, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The lattice points around the middle of a cell inside the support (P, d) and their W and −W′/ξ (P,)."""
     precision, support = PRECISIONS["float64"], KERNELS[kernel].support
-    weigh, reach = SMOOTHING_FUNCTIONS[kernel](precision), int(np.ceil(ratio * support))
+    weigh, reach = KERNELS[kernel].weights(precision), int(np.ceil(ratio * support))
     x = np.array(list(itertools.product(np.arange(-reach, reach) + 0.5, repeat=dim)))
     s = (x**2).sum(axis=1) / ratio**2
     inside = s < EDGE * support**2
@@ -248,7 +249,7 @@ def main(arguments: list[str] | None = None) -> int:
         for mesh in meshes:
             numerics.check_support(CONTINUA[mesh.dim])
         if options.limits:
-            for mesh, scheme in itertools.product(meshes, VELOCITY_SCHEMES):
+            for mesh, scheme in itertools.product(meshes, SCHEMES):
                 print(f"{mesh.dim}D {scheme}: {largest_courant(mesh, scheme):.3f}")
             return 0
         options.out.mkdir(parents=True, exist_ok=True)

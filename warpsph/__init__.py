@@ -18,16 +18,9 @@ A scene is built from named parts and run by a `Simulation`:
 
 __version__ = "0.1.0"
 
-from .analysis.measures import (
-    Sampler,
-    checkerboard_amplitude,
-    fit_band,
-    growth_rate,
-    smallest_distance,
-    trace_ridge,
-)
+from . import analysis, frames
 from .errors import NonFiniteError, SceneError, WarpSPHError
-from .export.frames import Frames, FrameWriter
+from .materials import Elastic, Material, PerzynaVonMises
 from .scene import (
     PUBLISHED,
     BodyForce,
@@ -35,7 +28,6 @@ from .scene import (
     Check,
     Disc,
     EdgeForce,
-    Elastic,
     Fixed,
     Free,
     FreeSurface,
@@ -44,7 +36,6 @@ from .scene import (
     Numerics,
     Output,
     Parameter,
-    PerzynaVonMises,
     Polygon,
     PrescribedVelocity,
     Probe,
@@ -54,10 +45,12 @@ from .scene import (
     Rotating,
     Scene,
     Shape,
+    SmoothingKernel,
     Table,
     edge,
     everywhere,
     region,
+    register,
     where,
 )
 from .simulation.checkpoint import Checkpoint, write_checkpoint
@@ -74,12 +67,11 @@ __all__ = [
     "EdgeForce",
     "Elastic",
     "Fixed",
-    "FrameWriter",
-    "Frames",
     "Free",
     "FreeSurface",
     "History",
     "Linear",
+    "Material",
     "NodeValue",
     "NonFiniteError",
     "Numerics",
@@ -94,21 +86,19 @@ __all__ = [
     "Ramp",
     "Roller",
     "Rotating",
-    "Sampler",
     "Scene",
     "SceneError",
     "Shape",
     "Simulation",
+    "SmoothingKernel",
     "Table",
     "WarpSPHError",
-    "checkerboard_amplitude",
+    "analysis",
     "edge",
     "everywhere",
-    "fit_band",
-    "growth_rate",
+    "frames",
     "region",
-    "smallest_distance",
-    "trace_ridge",
+    "register",
     "where",
     "write_checkpoint",
 ]

@@ -12,89 +12,101 @@ import sys
 import warp as wp
 
 from warpsph import Simulation
+from warpsph.state.pairs import PairList
 
 # phase: (times a step, arrays read, arrays written), as attributes of the stepper, for the default numerics;
-# "pairs" are list entries.
+# pair lists count their entries.
 TRAFFIC = {
-    "sources": (2, ("nodes.point", "nodes.velocity_gradient", "history"), ("nodes.point", "history")),
+    "sources": (
+        2,
+        ("body.nodes.point", "body.nodes.velocity_gradient", "body.internals"),
+        ("body.nodes.point", "body.internals"),
+    ),
     "to_auxiliary": (
         1,
         (
-            "_around_auxiliary.pairs",
-            "nodes.point",
-            "nodes.volume",
-            "nodes.velocity_gradient",
-            "history",
-            "auxiliary.point",
-            "auxiliary.smoothing_length",
-            "auxiliary.density",
-            "auxiliary.cell",
+            "lists.around_auxiliary",
+            "body.nodes.point",
+            "body.nodes.volume",
+            "body.nodes.velocity_gradient",
+            "body.internals",
+            "body.auxiliary.point",
+            "body.auxiliary.smoothing_length",
+            "body.auxiliary.density",
+            "body.auxiliary.cell",
         ),
-        ("auxiliary.point", "_fluxes._cells.numbers"),
+        ("body.auxiliary.point", "fluxes._cells"),
     ),
     "to_nodes": (
         1,
         (
-            "_around_nodes.pairs",
-            "auxiliary.point",
-            "auxiliary.volume",
-            "_fluxes._cells.numbers",
-            "_fluxes._cells.of_node",
-            "nodes.point",
-            "nodes.smoothing_length",
-            "nodes.density",
-            "nodes.velocity_gradient",
+            "lists.around_nodes",
+            "body.auxiliary.point",
+            "body.auxiliary.volume",
+            "fluxes._cells",
+            "body.node_cells.first",
+            "body.node_cells.place",
+            "body.nodes.point",
+            "body.nodes.smoothing_length",
+            "body.nodes.density",
+            "body.nodes.velocity_gradient",
             "conditions.table.row",
         ),
-        ("nodes.point", "nodes.half_velocity", "nodes.velocity_gradient"),
+        ("body.nodes.point", "body.nodes.half_velocity", "body.nodes.velocity_gradient"),
     ),
-    "conditions": (1, ("nodes.point", "nodes.displacement", "conditions.table.row"), ("nodes.point",)),
+    "conditions": (
+        1,
+        ("body.nodes.point", "body.nodes.displacement", "conditions.table.row"),
+        ("body.nodes.point",),
+    ),
     "motion": (
         1,
         (
             # the nodes move
-            "nodes.point",
-            "nodes.displacement",
-            "nodes.half_velocity",
-            "nodes.reference",
+            "body.nodes.point",
+            "body.nodes.displacement",
+            "body.nodes.half_velocity",
+            "body.nodes.reference",
             # the cells are measured
-            "nodes.point",
-            "auxiliary.cell",
-            "auxiliary.point",
-            "_motion._initial_volume",
-            "_motion._cell_h",
+            "body.nodes.point",
+            "body.auxiliary.cell",
+            "body.auxiliary.point",
+            "lists.motion._initial_volume",
+            "lists.motion._mass",
+            "lists.motion._cell_h",
             # the nodes get their share
-            "auxiliary.volume",
-            "auxiliary.smoothing_length",
-            "_motion._of_node",
-            "nodes.weight",
-            "nodes.displacement",
-            "_motion._listed",
-            "_motion._listed_h",
+            "body.auxiliary.volume",
+            "body.auxiliary.smoothing_length",
+            "body.node_cells.first",
+            "body.node_cells.place",
+            "body.nodes.weight",
+            "body.nodes.displacement",
+            "lists.motion._listed",
+            "lists.motion._listed_h",
         ),
         (
-            "nodes.point",
-            "nodes.displacement",
-            "auxiliary.point",
-            "auxiliary.volume",
-            "auxiliary.density",
-            "auxiliary.smoothing_length",
-            "nodes.volume",
-            "nodes.density",
-            "nodes.smoothing_length",
+            "body.nodes.point",
+            "body.nodes.displacement",
+            "body.auxiliary.point",
+            "body.auxiliary.volume",
+            "body.auxiliary.density",
+            "body.auxiliary.smoothing_length",
+            "body.nodes.volume",
+            "body.nodes.density",
+            "body.nodes.smoothing_length",
         ),
     ),
 }
 
 
-def pairs(neighbours) -> int:
+def pairs(pair_list: PairList) -> int:
     """Entries of a pair list."""
-    return int(neighbours.pairs.start[-1:].numpy()[0])
+    return int(pair_list.start[-1:].numpy()[0])
 
 
 def bytes_per_node_step(simulation: Simulation, phases) -> dict[str, float]:
     """Bytes moved a material node and step, by phase, for those phases that the scene has."""
-    stepper, n = simulation._stepper, len(simulation.mesh.nodes)
+    stepper, n = simulation.stepper, len(simulation.mesh.nodes)
     return {
         phase: times * sum(_size(stepper, name) for name in (*read, *written)) / n
         for phase, (times, read, written) in TRAFFIC.items()
@@ -103,11 +115,10 @@ def bytes_per_node_step(simulation: Simulation, phases) -> dict[str, float]:
 
 
 def _size(stepper, name: str) -> int:
-    if name.endswith(".pairs"):
-        neighbours = operator.attrgetter(name.removesuffix(".pairs"))(stepper)
-        return 4 * (pairs(neighbours) + neighbours.pairs.start.shape[0])
-    array = operator.attrgetter(name)(stepper)
-    return 0 if array is None else _bytes(array)
+    found = operator.attrgetter(name)(stepper)
+    if name.startswith("lists.around"):
+        return 4 * (pairs(found) + found.start.shape[0])
+    return 0 if found is None else _bytes(found)
 
 
 def _bytes(array: wp.array) -> int:
@@ -120,9 +131,9 @@ def flops_per_node_step(simulation: Simulation) -> float:
     With p unknowns in d dimensions a pair costs 5d + 4 + 3p + 2pd + 2d² (`warpsph.operators.neighbour_sums`), a
     target's value and gradient 4p + 2pd + 2pd² beside the small inverse. Sources and motion are not counted.
     """
-    stepper, continuum = simulation._stepper, simulation.mesh.continuum
+    stepper, continuum = simulation.stepper, simulation.mesh.continuum
     d, p = continuum.dim, continuum.dim + continuum.stress_size
-    entries = pairs(stepper._around_auxiliary) + pairs(stepper._around_nodes)
+    entries = pairs(stepper.lists.around_auxiliary) + pairs(stepper.lists.around_nodes)
     n, m = len(simulation.mesh.nodes), len(simulation.mesh.cells)
     a_pair = 5 * d + 4 + 3 * p + 2 * p * d + 2 * d * d
     a_target = 4 * p + 2 * p * d + 2 * p * d * d
@@ -132,7 +143,7 @@ def flops_per_node_step(simulation: Simulation) -> float:
 def memory_per_node(simulation: Simulation) -> float:
     """Bytes of all Warp arrays of the simulation a material node; what a hash grid holds inside is not seen."""
     found: dict[int, int] = {}
-    _collect_arrays(simulation._stepper, found, set())
+    _collect_arrays(simulation.stepper, found, set())
     return sum(found.values()) / len(simulation.mesh.nodes)
 
 

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from warpsph import Box, Elastic, Free, Numerics, PerzynaVonMises, Scene, edge
-from warpsph.scene.material import Elastic as AnyMaterial
+from warpsph import Box, Elastic, Free, Material, Numerics, PerzynaVonMises, Scene, edge
 
 # With half a skin of Δx/8 the pair lists are rebuilt about every 40 steps: often for a soil, whose nodes move some
 # 10⁻³ Δx a step, so that lists weigh rather more in the figures than in a run.
@@ -12,7 +11,7 @@ SHEAR = 0.5  # difference in velocity between the body's ends over its mean velo
 YIELD_SIZE = 5e3  # [Pa]
 
 SOIL = {"young_modulus": 8e7, "poisson_ratio": 0.3, "density": 2000.0}
-MATERIALS: dict[str, AnyMaterial] = {
+MATERIALS: dict[str, Material] = {
     "elastic": Elastic(**SOIL),
     "viscoplastic": PerzynaVonMises(**SOIL, fluidity=1.0, yield_size=YIELD_SIZE),
 }

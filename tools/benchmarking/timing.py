@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import operator
 import time
 from collections import defaultdict
 
@@ -9,14 +10,14 @@ import warp as wp
 
 from warpsph import Simulation
 
-# The parts of `Stepper.step` by phase: (attribute of the stepper or None for itself, method).
+# The parts of `Stepper.step` by phase: (attribute of the stepper, method).
 PHASES = {
     "sources": ("_sources", "half_step"),
-    "to_auxiliary": (None, "to_auxiliary"),
-    "to_nodes": (None, "to_nodes"),
+    "to_auxiliary": ("fluxes", "to_auxiliary"),
+    "to_nodes": ("fluxes", "to_nodes"),
     "conditions": ("conditions", "apply"),
-    "motion": ("_motion", "move"),
-    "lists": (None, "_build_lists"),
+    "motion": ("lists.motion", "move"),
+    "lists": ("lists", "refresh"),
 }
 REST = "rest"  # all else: the clock, reading flags, evaluating functions of time, Python
 LONGEST_INTERVAL = 400  # steps; the scenes rebuild their lists every 40 or so
@@ -79,11 +80,11 @@ def time_phases(simulation: Simulation) -> dict[str, float]:
     The step is not recorded here, and the device is waited for after every phase, so the sum is more than the same
     steps take otherwise.
     """
-    stepper, spent = simulation._stepper, defaultdict(float)
+    stepper, spent = simulation.stepper, defaultdict(float)
     wrapped = []
     for phase, (part, method) in PHASES.items():
-        owner = stepper if part is None else getattr(stepper, part)
-        if part is not None and not owner.kernels:
+        owner = operator.attrgetter(part)(stepper)
+        if not owner.kernels:
             continue  # an object that does nothing
         object.__setattr__(owner, method, _timed(getattr(owner, method), phase, spent, simulation.device))
         wrapped.append((owner, method))
@@ -103,11 +104,11 @@ class _Plain:
     """Steps made launch by launch."""
 
     def __init__(self, stepper):
-        self._stepper = stepper
+        self.stepper = stepper
 
     def run(self) -> None:
-        while self._stepper.clock.going.numpy()[0]:
-            self._stepper.step()
+        while self.stepper.clock.going.numpy()[0]:
+            self.stepper.step()
 
 
 def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):

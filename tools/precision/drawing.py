@@ -8,13 +8,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from warpsph.scene.numerics import VELOCITY_SCHEMES
+from warpsph.scene.scheme import SCHEMES
 
 from .campaign import Result
 from .cases import Case
 from .settings import COURANT, Setting
 
-COLOURS = dict(zip(VELOCITY_SCHEMES, ("#1f77b4", "#7f7f7f", "#d62728"), strict=True))
+COLOURS = dict(zip(SCHEMES, ("#1f77b4", "#7f7f7f", "#d62728"), strict=True))
 LINES = dict(zip(COURANT, ((":", "s"), ("-", "o"), ("--", "^"), ("-.", "D")), strict=True))
 OTHERS = ("#d62728", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22", "#17becf")
 COSTS = (("node_steps", "node-steps"), ("wall_s", "wall time [s]"))
@@ -69,7 +69,7 @@ def overview(results: Mapping[Case, Sequence[Result]], path: Path) -> Path:
 
 def _schemes(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
     lines = {}
-    for scheme in VELOCITY_SCHEMES:
+    for scheme in SCHEMES:
         for courant in COURANT:
             base = [r for r in results if r.setting == Setting(r.setting.spacing, scheme, courant)]
             line, marker = LINES[courant]

@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from itertools import product
 
-from warpsph.scene.numerics import KERNELS, VELOCITY_SCHEMES, Numerics
+from warpsph.scene.numerics import Numerics
+from warpsph.scene.registry import KERNELS
+from warpsph.scene.scheme import SCHEMES
 
 COURANT = (0.4, 0.8, 0.9, 1.0)
 EXACT_RATIO = 0.5  # h/Δx of the Gaussian with the nearest neighbours only: at C = 1 a bar's waves are exact
@@ -68,7 +70,7 @@ def parse(texts: dict[str, str]) -> Setting:
 def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator[Setting]:
     """Every setting at one spacing; of source schemes only where sources matter."""
     base = Setting(spacing)
-    for scheme, courant in product(VELOCITY_SCHEMES, COURANT):
+    for scheme, courant in product(SCHEMES, COURANT):
         yield replace(base, velocity_scheme=scheme, courant=courant)
     for kernel in KERNELS:
         if kernel != base.kernel:
@@ -76,7 +78,7 @@ def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator
     for ratio in ratios:
         yield replace(base, smoothing_ratio=ratio)
     if EXACT_RATIO in ratios:
-        for scheme in VELOCITY_SCHEMES:
+        for scheme in SCHEMES:
             yield replace(base, velocity_scheme=scheme, courant=1.0, smoothing_ratio=EXACT_RATIO)
     yield replace(base, precision="float32")
     if flows:

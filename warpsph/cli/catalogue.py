@@ -15,10 +15,9 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
-import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -27,6 +26,7 @@ from ..scene.check import Check
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
 from ..validate import instance, listed
+from .neighbours import Neighbours
 from .settings import Settings
 
 DEFAULT_NUMERICS = "numerics=default"
@@ -50,6 +50,7 @@ class SceneFile:
 
     name: str
     module: ModuleType
+    neighbours: Neighbours
 
     @property
     def origin(self) -> tuple[Path, Path, bool]:
@@ -96,25 +97,25 @@ class SceneFile:
 
     def build_from(self, values: Mapping[str, object]) -> Scene:
         """The scene with these values of all parameters."""
-        with self.blamed():
+        with self.errors_located():
             scene = self.module.scene(namespace(values))
-        instance(f"{self.name}.scene(p)", scene, Scene, "a Scene")
-        object.__setattr__(scene, "name", self.name)
-        return scene
+            return replace(instance(f"{self.name}.scene(p)", scene, Scene, "a Scene"), name=self.name)
 
     def checks(self, run: SimpleNamespace) -> list[Check]:
         """The checks of a finished run."""
         if not hasattr(self.module, "checks"):
             return []
-        with self.blamed():
+        with self.errors_located():
             checks = self.module.checks(run)
         return list(listed(f"{self.name}.checks(run)", checks, Check, "a sequence of Check"))
 
     @contextlib.contextmanager
-    def blamed(self) -> Iterator[None]:
-        """Turns what a function of the file raises into a `SceneError` that names the line."""
+    def errors_located(self) -> Iterator[None]:
+        """For what calls functions of the file: they import as they did while it was loaded, and what they raise
+        becomes a `SceneError` that names the line."""
         try:
-            yield
+            with self.neighbours.importable():
+                yield
         except WarpSPHError:
             raise
         except (Exception, SystemExit) as error:  # a user's function may raise anything
@@ -134,10 +135,10 @@ def load(name: str) -> SceneFile:
     path = scenes.get(name, Path(name).absolute())
     if not path.is_file():
         raise SceneError("scene", name, f"{one_of(scenes, name)}, or the path of a scene file")
-    return load_file(path, path.stem, path.parent)
+    return load_file(path, name=path.stem, neighbours=path.parent)
 
 
-def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
+def load_file(path: Path, *, name: str, neighbours: Path) -> SceneFile:
     """A scene file by path.
 
     Args:
@@ -148,29 +149,19 @@ def load_file(path: Path, name: str, neighbours: Path) -> SceneFile:
     Raises:
         SceneError: the file can not be loaded.
     """
-    spec = importlib.util.spec_from_file_location(f"warpsph_scene_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(f"warpsph_scene_{name}", path)
     if spec is None:
         raise SceneError("scene", str(path), "the file's name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up there
+    module, own = importlib.util.module_from_spec(spec), Neighbours(neighbours)
+    own.add(spec.name, module)  # dataclasses look their module up
     try:
-        with _importing_from(neighbours):
+        with own.importable():
             spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise _located(path, error) from error
     if not callable(getattr(module, "scene", None)):
         raise SceneError("scene", str(path), "the file must define a function scene(p)")
-    return SceneFile(name, module)
-
-
-@contextlib.contextmanager
-def _importing_from(folder: Path) -> Iterator[None]:
-    """Lets a scene file import its neighbours, as a script may."""
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
+    return SceneFile(name, module, own)
 
 
 def _located(path: Path, error: BaseException) -> SceneError:

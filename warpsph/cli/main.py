@@ -5,20 +5,21 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
+from importlib import import_module
 
 from .. import __version__
 from ..errors import SceneError, StoppedError
 from ..storage.names import printable
-from ..storage.owner import owned
 from . import new, sweep_command
 from .catalogue import load, shipped
 from .exporting import add_export
 from .parent import end_with_parent
 from .plotting import add_plot
 from .run_command import add_run
-from .stopping import interrupting
 from .streams import steady_streams
+
+# Rooms above this one add their commands by these modules: a name, since imports point down.
+FURTHER = ("warpsph.report.command",)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,20 +62,8 @@ def _parser() -> argparse.ArgumentParser:
 
     add_plot(commands)
     add_export(commands)
-
-    reporting = commands.add_parser(
-        "report",
-        help="run every case of the paper and lay it out beside the paper's and the exact results",
-        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call "
-        "of this version with these parameters has finished are kept; delete a run's folder to repeat it.",
-    )
-    reporting.add_argument("--quick", action="store_true", help="coarser and shorter where a case takes minutes")
-    reporting.add_argument(
-        "--out", metavar="DIR", help="folder of the report (default: runs/report, or report-quick)"
-    )
-    reporting.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
-    reporting.add_argument("--jobs", type=int, default=2, help="runs at a time (default: 2)")
-    reporting.set_defaults(command=_report)
+    for module in FURTHER:
+        import_module(module).add_parser(commands)
     return parser
 
 
@@ -91,22 +80,6 @@ def _list(options: argparse.Namespace) -> int:
     widths = [max(len(row[k]) for row in rows) for k in range(3)]
     for row in rows:
         print("  ".join(cell.ljust(w) for cell, w in zip(row, [*widths, 0], strict=True)).rstrip())
-    return 0
-
-
-def _report(options: argparse.Namespace) -> int:
-    from ..report.command import report  # matplotlib, and all cases: slow to import
-
-    if options.jobs < 1:
-        raise SceneError("--jobs", options.jobs, "it must be at least 1")
-    default = Path("runs") / ("report-quick" if options.quick else "report")
-    folder = Path(options.out or default)
-    try:
-        with owned(folder), interrupting():
-            report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
-    except KeyboardInterrupt:
-        print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
     return 0
 
 

@@ -69,9 +69,9 @@ class Member(SceneRun):
             status = _call(anew, folder)
         if status not in (0, 1):
             (folder / SUMMARY).unlink(missing_ok=True)  # its checks raised: it is not done
-            raise RuntimeError(said(folder) if status > 0 else f"its process ended by signal {-status}")
+            raise RuntimeError(last_line(folder) if status > 0 else f"its process ended by signal {-status}")
         if not (folder / SUMMARY).is_file():
-            raise RuntimeError(said(folder))
+            raise RuntimeError(last_line(folder))
 
 
 def _has_checkpoint(path: Path) -> bool:
@@ -92,7 +92,7 @@ def _call(command: Sequence[str], folder: Path) -> int:
         return CHILDREN.call(command, log, {THREADS: "1"})
 
 
-def said(folder: Path) -> str:
+def last_line(folder: Path) -> str:
     """The last line of a run's log."""
     with suppress(OSError, IndexError):
         return (folder / "log.txt").read_text(encoding="utf-8").splitlines()[-1].removeprefix("warpsph: ")

@@ -29,7 +29,8 @@ def add_plot(commands) -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from ..export import pictures  # matplotlib is slow to import
+    from ..export.pictures.field import animate, plot_frame  # matplotlib is slow to import
+    from ..export.pictures.sheet import plot_overview
     from ..export.quantity import quantity
 
     frames = kept_frames(options.dir)
@@ -39,14 +40,14 @@ def _plot(options: argparse.Namespace) -> int:
     try:
         if options.animate:
             path = folder / f"{shown.name}.{options.animate}"
-            pictures.animate(frames, shown, path)
+            animate(frames, shown, path=path)
         elif options.time is not None:
             frame = frames.nearest(_time(options.time))
             path = folder / f"{shown.name}_{frame.number:06d}.png"
-            pictures.plot_frame(frames, shown, frame, path)
+            plot_frame(frames, shown, frame=frame, path=path)
         else:
             path = folder / "overview.png"
-            pictures.plot_overview(frames, shown, path)
+            plot_overview(frames, shown, path=path)
     except OSError as error:
         raise SceneError("DIR", options.dir, f"it must be a folder that can be written ({error})") from None
     print(path)

@@ -110,8 +110,8 @@ class _Queue:
     def _say(self, run: SceneRun, error: BaseException | None) -> None:
         self._finished, self._ready = self._finished + 1, self._ready + self._cost[run]
         if not self._quiet:
-            elapsed, said = clock.perf_counter() - self._begin, "" if error is None else f": {error}"
-            line = f"[{self._finished}/{len(self._missing)}] {run.name} ({elapsed:.0f} s){said}"
+            elapsed, reason = clock.perf_counter() - self._begin, "" if error is None else f": {error}"
+            line = f"[{self._finished}/{len(self._missing)}] {run.name} ({elapsed:.0f} s){reason}"
             self._bar.write(line, file=sys.stdout)
             sys.stdout.flush()
 

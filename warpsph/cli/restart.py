@@ -66,7 +66,7 @@ class _Nothing:
 def settings_of(checkpoint: Checkpoint, folder: Path, usd: str | None = None) -> Settings:
     """How the run was made that left a checkpoint in a folder; `usd` as in `Settings.read`."""
     header = checkpoint.header
-    leg = header["values"]["leg"] or {}
-    found = {"device": header["device"], "precision": header["precision"], "until": leg.get("end")}
+    stretch = header["values"]["stretch"] or {}
+    found = {"device": header["device"], "precision": header["precision"], "until": stretch.get("end")}
     table = {name: value for name, value in (found | header["run"]).items() if value is not None}
     return Settings.read(table, folder, usd)

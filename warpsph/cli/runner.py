@@ -14,8 +14,9 @@ from typing import Protocol
 from .. import __version__
 from ..errors import NonFiniteError, SceneError, StoppedError
 from ..export.frame_files import read_about
-from ..export.plots import plot_field, plot_history
-from ..export.surface_plot import plot_surface
+from ..export.pictures.field import plot_field
+from ..export.pictures.history import plot_history
+from ..export.pictures.surface import plot_surface
 from ..scene.check import Check
 from ..scene.output import Probe, component
 from ..scene.scene import Scene
@@ -161,7 +162,7 @@ def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
         restart.checkpoint.restore(simulation)
         read_about(folder)
     else:
-        with file.blamed():
+        with file.errors_located():
             for probe in scene.output.probes:
                 _check_probe(probe, probe.function(simulation))
     if settings.until is not None:
@@ -187,14 +188,14 @@ def _check_probe(probe: Probe, value: object) -> None:
 def _advance(course: Course, restart: Restart, watching: Sequence[Callable], show: bool) -> None:
     """Take the run to its end, or to where something ends it."""
     simulation = course.simulation
-    with course.file.blamed():
+    with course.file.errors_located():
         course.history = History(simulation, course.folder / HISTORY, restart.history)
     progress = Progress(simulation, course.end, show)
     observers = [course.history, progress, *(watch(simulation) for watch in watching)]
     begin = clock.perf_counter()
     try:
         with (
-            course.file.blamed(),
+            course.file.errors_located(),
             restart.watching(simulation, course.history, course.folder, course.settings) as checkpoints,
         ):
             simulation.run(until=course.end, observers=[*observers, checkpoints])

@@ -68,7 +68,7 @@ class StoredScene:
 
     @cached_property
     def _file(self) -> Path | None:
-        """The scene file it came from, which must lie beside the data and be the one that was run; None without."""
+        """The scene file it came from, which lies beside the data and is the one that was run; None without."""
         code = self._code
         if not code:
             return None
@@ -95,7 +95,7 @@ class StoredScene:
     @cached_property
     def source(self) -> SceneFile | None:
         """The scene file it came from, which is executed now; None when the data is all there is."""
-        return load_file(self._file, self.name, self._neighbours) if self._file else None
+        return load_file(self._file, name=self.name, neighbours=self._neighbours) if self._file else None
 
     @property
     def _given(self) -> Mapping[str, object]:
@@ -142,9 +142,9 @@ class StoredScene:
         """The checks of a finished run, where the data say that its scene file has some."""
         return self.source.checks(run) if self._code.get("checks") and self.source else []
 
-    def blamed(self) -> contextlib.AbstractContextManager:
+    def errors_located(self) -> contextlib.AbstractContextManager:
         """Turns what the scene file's functions raise into a `SceneError`."""
-        return self.source.blamed() if "source" in vars(self) and self.source else contextlib.nullcontext()
+        return self.source.errors_located() if "source" in vars(self) and self.source else contextlib.nullcontext()
 
 
 def open_scene(name: str) -> SceneFile | StoredScene:

@@ -19,7 +19,7 @@ from ..storage.files import write_text
 from ..storage.names import LONGEST
 from .catalogue import load, shipped
 from .children import CHILDREN
-from .member import Member, said
+from .member import Member, last_line
 from .queue import make_missing
 from .run_folder import HISTORY, SUMMARY
 from .stopping import interrupting
@@ -50,7 +50,7 @@ def row(member: Member, folder: Path, error: BaseException | None = None) -> dic
     try:
         if error is None and member.done(folder):
             return found | _outcome(folder)
-        return found | {"status": "failed to run", "message": str(error) if error else said(folder)}
+        return found | {"status": "failed to run", "message": str(error) if error else last_line(folder)}
     except SceneError as unreadable:
         return found | {"status": "failed to run", "message": str(unreadable)}
 

@@ -1,8 +1,8 @@
-"""Colours of a quantity: a named colour map over a range that stays the same over all frames."""
+"""Colours of a quantity: a colour map over a span of values that hides no detail behind single outliers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import matplotlib
@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import SceneError, one_of
 from .frames import Frame
-from .plots import COLOUR_MAP, percentiles, span_of
 from .quantity import Quantity
 
+COLOUR_MAP = "cividis"  # readable with every common colour-vision deficiency, and in grey
 SHADES = 1024
 
 
@@ -52,3 +52,31 @@ def named_map(name: str | None) -> str:
 def whole_span(quantity: Quantity, frames: Iterable[Frame]) -> tuple[float, float]:
     """The span of a quantity over all frames, single outliers left out."""
     return span_of([percentiles(quantity(frame)) for frame in frames])
+
+
+def colour_span(values: np.ndarray) -> tuple[float, float]:
+    """The middle 99 % of the values: a single node at a footing's edge would hide all others.
+
+    From zero on where all values are positive and come near it.
+    """
+    return span_of([percentiles(values)])
+
+
+def percentiles(values: np.ndarray) -> np.ndarray:
+    """The smallest value and the ends of the middle 99 %, shape (3,)."""
+    return np.percentile(values, [0.0, 0.5, 99.5])
+
+
+def span_of(several: Sequence[np.ndarray]) -> tuple[float, float]:
+    """The span of colours that shows several pictures, each given by its `percentiles`."""
+    smallest, low, high = np.min(several, axis=0)[0], np.min(several, axis=0)[1], np.max(several, axis=0)[2]
+    low = 0.0 if smallest >= 0.0 and low < 0.2 * high else low
+    return float(low), float(high if high > low else low + 1.0)
+
+
+def beyond(values: np.ndarray, span: tuple[float, float]) -> str:
+    """On which sides values lie beyond a span of colours, as `Figure.colorbar` wants it."""
+    below, above = bool(values.min() < span[0]), bool(values.max() > span[1])
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
+        below, above
+    ]

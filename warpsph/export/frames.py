@@ -13,9 +13,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ..analysis import green_strain, mean_stress, von_mises
 from ..errors import SceneError, one_of
 from ..mesh.mesh import Mesh
-from ..simulation.fields import FIELDS, fields_of, green_strain, internal_variables, mean_stress, von_mises
+from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
 from ..storage.files import write_json
 from .frame_files import (
@@ -138,7 +139,7 @@ class Frame:
         number: index of the time asked for.
         time: simulated time [s].
         step: number of the step.
-        lattice: the initial lattice.
+        mesh: the initial mesh.
         stored: the stored fields, name → values.
     """
 
@@ -172,7 +173,7 @@ class Frames(Sequence):
         about: what `about.json` says.
         times: those asked for [s].
         rate: frames a second of simulated time [1/s].
-        lattice: the initial lattice.
+        mesh: the initial mesh.
         walls: what surrounds the body.
 
     Raises:

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from ..errors import SceneError, one_of
-from ..simulation.fields import component_names
-from .frames import Frame, Frames
+from ..mesh.mesh import Mesh
+from ..scene.scene import Scene
+from ..simulation.fields import component_names, fields_of
+from .frames import Frames
+
+
+class Snapshot(Protocol):
+    """What can be drawn: a frame, or a simulation as it is now."""
+
+    mesh: Mesh
+    time: float
+
+    def field(self, name: str) -> np.ndarray:
+        """A node field."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +40,9 @@ class Quantity:
     component: int | None = None
     part: str = ""
 
-    def __call__(self, frame: Frame) -> np.ndarray:
+    def __call__(self, frame: Snapshot) -> np.ndarray:
         """Its values at a frame, shape (n,)."""
-        values = frame.field(self.field).reshape(len(frame.mesh.nodes), -1)
+        values = frame.field(self.field).astype(float).reshape(len(frame.mesh.nodes), -1)
         return np.linalg.norm(values, axis=1) if self.component is None else values[:, self.component]
 
     @property
@@ -49,15 +62,13 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     Raises:
         SceneError: there is no such field or component.
     """
-    continuum, about = frames.mesh.continuum, frames.about
+    continuum = frames.mesh.continuum
     if text is None:
-        parts = component_names(about["field"], continuum)
-        if about["component"] >= max(1, len(parts)):
-            raise SceneError(
-                "frames", str(frames.run), f"about.json names a component that {about['field']} lacks"
-            )
-        part = parts[about["component"]] if parts else ""
-        return Quantity(about["field"], frames.unit(about["field"]), about["component"], part)
+        field, component = frames.about["field"], frames.about["component"]
+        parts = component_names(field, continuum)
+        if component >= max(1, len(parts)):
+            raise SceneError("frames", str(frames.run), f"about.json names a component that {field} lacks")
+        return _component(field, frames.unit(field), component, parts)
     field, colon, part = text.partition(":")
     if field not in frames.fields:
         raise SceneError("--field", text, one_of(frames.fields, field))
@@ -71,3 +82,13 @@ def quantity(text: str | None, frames: Frames) -> Quantity:
     if not parts:
         raise SceneError("--field", text, f"{field} has no components")
     raise SceneError("--field", text, one_of([f"{field}:{name}" for name in parts], text))
+
+
+def own_quantity(scene: Scene) -> Quantity:
+    """The quantity that a scene asks to be drawn."""
+    field, component = scene.output.field, scene.output.component
+    return _component(field, fields_of(scene)[field].unit, component, component_names(field, scene.mesh.continuum))
+
+
+def _component(field: str, unit: str, component: int, parts: tuple[str, ...]) -> Quantity:
+    return Quantity(field, unit, component, parts[component] if parts else "")

@@ -16,9 +16,8 @@ from pxr import Gf, Sdf, Usd, Vt
 from ..errors import SceneError
 from ..storage.files import remove_parts, whole
 from ..storage.owner import empty, holds_only, mark
-from .colours import Colouring
+from .colours import Colouring, percentiles, span_of
 from .frames import Frames
-from .plots import percentiles, span_of
 from .quantity import quantity
 from .usd import ROOT, Drawing, check_written, usd_errors, write_stage
 

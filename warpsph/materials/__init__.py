@@ -1,23 +1,23 @@
-"""Material laws: one file each, and one row here; see docs/materials.md."""
+"""Materials, one file each: a dataclass for the scene and its law for the kernels; see docs/materials.md.
 
-from __future__ import annotations
+What a material of one's own is made of is here as well: `Material` or a subclass with a `parameter` each, what its
+nodes remember (`InternalVariable`) and show (`DerivedField`), the `Law` in a `Space`, `with_moduli` for its parameters.
+"""
 
-from ..errors import SceneError, one_of
 from ..physics.space import Space
-from ..scene.material import Elastic, PerzynaVonMises
-from .elastic import elastic
+from ..scene.material import DerivedField, InternalVariable, Material, parameter
+from .elastic import Elastic, with_moduli
 from .law import Law
-from .perzyna_von_mises import perzyna_von_mises
+from .perzyna_von_mises import PerzynaVonMises
 
-LAWS = {Elastic: elastic, PerzynaVonMises: perzyna_von_mises}
-
-
-def law(material: Elastic, space: Space) -> Law:
-    """The law of a scene's material.
-
-    Raises:
-        SceneError: `LAWS` has no row for it.
-    """
-    if type(material) not in LAWS:
-        raise SceneError("material", material, one_of([kind.__name__ for kind in LAWS]))
-    return LAWS[type(material)](space)
+__all__ = [
+    "DerivedField",
+    "Elastic",
+    "InternalVariable",
+    "Law",
+    "Material",
+    "PerzynaVonMises",
+    "Space",
+    "parameter",
+    "with_moduli",
+]

@@ -4,26 +4,75 @@ d_vp = γ ⟨(q − Y)/Y⟩ᴺ ∂q/∂σ, dε̄/dt = γ ⟨(q − Y)/Y⟩ᴺ, Y
 the only internal variable.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
+import numpy as np
 import warp as wp
 
 from ..physics.space import Space
-from ..scene.material import PerzynaVonMises
-from .elastic import fill_moduli
+from ..scene.material import DerivedField, InternalVariable, parameter
+from ..scene.registry import register
+from .elastic import Elastic, with_moduli
 from .law import Law
 
 MEAN_YIELD_ITERATIONS = 4
 
 
+@register
+@dataclass(frozen=True, kw_only=True)
+class PerzynaVonMises(Elastic):
+    """Perzyna viscoplasticity with von Mises yield: dε̄/dt = γ ⟨(q − Y)/Y⟩ᴺ, Y = max(Y0 + H ε̄, r Y0).
+
+    Raises:
+        SceneError: a parameter is not allowed.
+
+    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ (METHOD section 1); the paper lets Y reach zero.
+
+    >>> soil = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
+    >>> soil.flow_rate(dim=1)  # E γ N/Y0 in a bar
+    400.0
+    """
+
+    fluidity: float = parameter("1/s", "fluidity γ", at_least=0.0)
+    exponent: float = parameter("-", "exponent N of the overstress", default=1.0, at_least=1.0)
+    yield_size: float = parameter("Pa", "initial size Y0 of the yield surface, a uniaxial yield stress", above=0.0)
+    hardening: float = parameter("Pa", "H = dY/dε̄, above −E; negative softens", default=0.0)
+    residual_ratio: float = parameter(
+        "-", "softening ends at this share r of Y0", default=0.1, above=0.0, at_most=1.0
+    )
+
+    internals = (InternalVariable("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),)
+    derived = (
+        DerivedField(
+            "yield_size",
+            "Pa",
+            "size of the yield surface Y",
+            lambda stress, internals, material: material.yield_size_at(internals[:, 0]),
+        ),
+    )
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.require("hardening", above=-self.young_modulus)
+
+    def flow_rate(self, dim: int) -> float:
+        """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""
+        smallest_yield_size = self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
+        return self.relaxation_modulus(dim) * self.fluidity * self.exponent / smallest_yield_size
+
+    def yield_size_at(self, plastic_strain: np.ndarray) -> np.ndarray:
+        """Y [Pa] at equivalent plastic strains ε̄, of the same shape."""
+        return np.maximum(self.yield_size + self.hardening * plastic_strain, self.residual_ratio * self.yield_size)
+
+    def law(self, space: Space) -> Law:
+        """The viscoplastic law."""
+        return _law(space)
+
+
 @cache
-def perzyna_von_mises(space: Space) -> Law:
-    """The viscoplastic law."""
-    real = space.real
-    stress, scalar = space.vec(space.continuum.stress_size), space.vec(1)
-    kin = space.stress
-    von_mises, relaxation = kin.von_mises, kin.relaxation
-    in_bar = space.dim == 1
+def _law(space: Space) -> Law:
+    real, scalar = space.real, space.vec(1)
 
     @wp.struct
     class PerzynaParameters:
@@ -38,8 +87,7 @@ def perzyna_von_mises(space: Space) -> Law:
         mean_yield_iterations: wp.int32
 
     def fill(material: PerzynaVonMises):
-        parameters = PerzynaParameters()
-        fill_moduli(parameters, material)
+        parameters = with_moduli(PerzynaParameters(), material)
         parameters.fluidity = material.fluidity
         parameters.exponent = material.exponent
         parameters.yield_size = material.yield_size
@@ -54,33 +102,30 @@ def perzyna_von_mises(space: Space) -> Law:
         return wp.where(p.residual > Y, p.residual, Y)  # unlike a maximum, keeps a NaN
 
     @wp.func
-    def flow(sigma: stress, internals: scalar, p: PerzynaParameters):
-        q = von_mises(sigma)
+    def flow(sigma: space.types.stress, internals: scalar, p: PerzynaParameters):
+        q = space.stress.von_mises(sigma)
         Y = current_yield_size(internals[0], p)
-        rate = stress()
+        rate = space.types.stress()
         eps_rate = scalar()
         if not q <= Y:  # a NaN flows, and shows
             over = (q - Y) / Y
             if p.exponent != real(1.0):
                 over = wp.pow(over, p.exponent)
             eps_rate[0] = p.fluidity * over
-            rate = -eps_rate[0] * relaxation(sigma, q, p.shear, p.young)
+            rate = -eps_rate[0] * space.stress.relaxation(sigma, q, p.shear, p.young)
         return rate, eps_rate
 
     @wp.func
-    def flow_stiffness(sigma: stress, internals: scalar, p: PerzynaParameters):
+    def flow_stiffness(sigma: space.types.stress, internals: scalar, p: PerzynaParameters):
         """A bound of the rate at which the overstress decays: (3G + |H| q/Y) γ N ⟨(q − Y)/Y⟩^{N−1}/Y."""
-        q = von_mises(sigma)
+        q = space.stress.von_mises(sigma)
         Y = current_yield_size(internals[0], p)
-        modulus = real(3.0) * p.shear
-        if wp.static(in_bar):
-            modulus = p.young
         lam = real(0.0)
         if q > Y:
             slope = p.fluidity / Y
             if p.exponent != real(1.0):
                 slope *= p.exponent * wp.pow((q - Y) / Y, p.exponent - real(1.0))
-            lam = slope * (modulus + wp.abs(p.hardening) * q / Y)
+            lam = slope * (space.stress.relaxation_modulus(p.shear, p.young) + wp.abs(p.hardening) * q / Y)
         return lam
 
     @wp.func
@@ -93,15 +138,13 @@ def perzyna_von_mises(space: Space) -> Law:
         return over * wp.pow(real(1.0) + n * rate * wp.pow(over / Y, n), -real(1.0) / n)
 
     @wp.func
-    def relax(sigma: stress, internals: scalar, p: PerzynaParameters, dt: real):
-        q = von_mises(sigma)
+    def relax(sigma: space.types.stress, internals: scalar, p: PerzynaParameters, dt: real):
+        q = space.stress.von_mises(sigma)
         eps = internals[0]
         Y = current_yield_size(eps, p)
         if q <= Y:
             return sigma, internals
-        modulus = real(3.0) * p.shear
-        if wp.static(in_bar):
-            modulus = p.young
+        modulus = space.stress.relaxation_modulus(p.shear, p.young)
         over = q - Y
         b = modulus + p.hardening
         if p.hardening < real(0.0) and p.residual >= Y:
@@ -119,13 +162,13 @@ def perzyna_von_mises(space: Space) -> Law:
             strain = softened + (over - overstress_after(over, modulus, p.residual, p, left)) / modulus
         internals_new = internals
         internals_new[0] = eps + strain
-        return sigma - strain * relaxation(sigma, q, p.shear, p.young), internals_new
+        return sigma - strain * space.stress.relaxation(sigma, q, p.shear, p.young), internals_new
 
     return Law(
-        PerzynaParameters,
-        fill,
-        internals=(("equivalent_plastic_strain", "-", "equivalent viscoplastic strain ε̄"),),
+        Parameters=PerzynaParameters,
+        fill=fill,
+        internals=PerzynaVonMises.internals,
+        relax=relax,
         flow=flow,
         flow_stiffness=flow_stiffness,
-        relax=relax,
     )

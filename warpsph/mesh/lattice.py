@@ -9,6 +9,36 @@ from .kinds import GRID_KINDS
 from .mesh import Mesh
 
 
+def hinges(kept: np.ndarray) -> np.ndarray:
+    """Points of a plane grid at which two kept cells meet that share no side, indices (k, 2)."""
+    a, b, c, d = kept[:-1, :-1], kept[:-1, 1:], kept[1:, :-1], kept[1:, 1:]
+    return np.argwhere((a == d) & (b == c) & (a != b)) + 1
+
+
+def parts(kept: np.ndarray) -> int:
+    """Number of parts that the kept cells of a plane grid make, by the sides they share.
+
+    Runs of cells along the second axis are joined, each to those beside it, in trees with a root a part.
+    """
+    column, change = np.nonzero(np.diff(np.pad(kept, ((0, 0), (1, 1))).astype(np.int8), axis=1))
+    column, first, end = column[::2], change[::2], change[1::2]
+    root = list(range(len(column)))
+
+    def find(run: int) -> int:
+        while root[run] != run:
+            root[run] = run = root[root[run]]
+        return run
+
+    starts = np.searchsorted(column, np.arange(len(kept) + 1))
+    for run, (x, low, high) in enumerate(zip(column.tolist(), first.tolist(), end.tolist(), strict=True)):
+        begin, stop = starts[max(x - 1, 0)], starts[x]
+        for other in range(begin + np.searchsorted(end[begin:stop], low, "right"), stop):
+            if first[other] >= high:
+                break
+            root[find(run)] = find(other)
+    return sum(root[run] == run for run in range(len(root)))
+
+
 def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.ndarray) -> Mesh:
     """The mesh made of the cells of a regular grid that are kept.
 

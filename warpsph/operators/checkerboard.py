@@ -20,14 +20,13 @@ MOST_OF_STRAIN = 0.5  # β. With 0.1 plastic zones of slow loadings turn rough, 
 @cache
 def taken_off(space: Space) -> wp.Function:
     """(checkerboard of the stress, L, G, Δt) → what is taken off [Pa], along the checkerboard."""
-    types, real = space.types, space.real
-    norm = space.stress.norm
+    real = space.real
 
     @wp.func
-    def off(checkerboard: types.stress, L: types.tensor, shear: real, dt: real):
+    def off(checkerboard: space.types.stress, L: space.types.tensor, shear: real, dt: real):
         whole = real(STRESS_SHARE) * checkerboard
         most = real(2.0 * MOST_OF_STRAIN) * shear * dt * wp.sqrt(wp.ddot(L, L))
-        size = norm(whole)
+        size = space.stress.norm(whole)
         if size > most:
             return (most / size) * whole
         return whole

@@ -119,7 +119,7 @@ class Conditions:
             table.function.assign(boundary.function)
         table.drive = self._clock.drive
 
-    def locate(self, nodes) -> None:
+    def refresh(self) -> None:
         """Nothing: all conditions are on nodes chosen once and for all."""
 
     def turn(self, nodes, dt: wp.array) -> None:

@@ -11,6 +11,7 @@ from functools import cache
 
 import warp as wp
 
+from ..mesh.kinds import CellKind
 from ..physics.space import Space
 
 STRENGTH = 1.0  # χ: ringing behind a front 4 % of the jump at C = 0.5 and 200 columns, 9 % without
@@ -18,10 +19,9 @@ ROUGH = 0.3
 
 
 @cache
-def front_pressure(space: Space) -> wp.Function:
+def front_pressure(space: Space, kind: CellKind) -> wp.Function:
     """(cell, tr L there, frame ∇ξ, auxiliary nodes, nodes, χ(1 − C²), Δt) → q [Pa], a tension."""
     types, real = space.types, space.real
-    corners = 2**space.dim
 
     @wp.func
     def pressure(
@@ -34,9 +34,9 @@ def front_pressure(space: Space) -> wp.Function:
         dt: real,
     ):
         mean, largest, per_width2 = real(0.0), wp.abs(rate), real(0.0)
-        for k in range(wp.static(corners)):
+        for k in range(wp.static(kind.corners)):
             own = wp.trace(nodes.velocity_gradient[auxiliary.cell[a, k]])
-            mean += own / real(corners)
+            mean += own / real(wp.static(kind.corners))
             largest = wp.max(largest, wp.abs(own))
         for b in range(wp.static(space.dim)):
             per_width2 = wp.max(per_width2, wp.length_sq(frame[b]))

@@ -13,10 +13,9 @@ import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
-from ..device.launching import Launcher
+from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..scene.numerics import KERNELS
-from ..scene.scene import Scene
+from ..state.body import Body
 
 
 @dataclass(frozen=True)
@@ -25,13 +24,13 @@ class NoMotion:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def move(self, nodes, auxiliary, dt: wp.array) -> None:
+    def move(self, dt: wp.array) -> None:
         """Nothing."""
 
-    def mark(self, nodes, auxiliary) -> None:
+    def mark(self) -> None:
         """Nothing."""
 
-    def shrinkage(self, nodes, auxiliary) -> float:
+    def shrinkage(self) -> float:
         """1: the spacing stays."""
         return 1.0
 
@@ -40,58 +39,52 @@ class Motion:
     """Moves the nodes with v^{n+1/2}, and tells when the pair lists have used up their skin.
 
     Args:
-        scene: the scene.
+        body: the body, whose auxiliary nodes have been centred.
         skin: skin of the pair lists [m].
         outdated: one integer, set once some node has used up its half of the skin since `mark`.
     """
 
-    def __init__(self, scene: Scene, skin: float, space: Space, launcher: Launcher, outdated: wp.array):
-        device, n = launcher.device, len(scene.mesh.nodes)
-        types = space.types
-        self._support, self._skin = KERNELS[scene.numerics.kernel].support, skin
-        self._reference_density = scene.material.density
-        self._initial_smoothing_length: wp.array | None = None
-        self._listed = wp.zeros(n, dtype=types.vector, device=device)
-        self._listed_h = wp.zeros(n, dtype=space.real, device=device)
-        self._launcher, self._outdated = launcher, outdated
-        self._kernel = _move_kernel(space)
-        self._centre = centre_kernel(space)
-        self.kernels = (self._kernel, self._centre)
+    def __init__(self, body: Body, *, skin: float, outdated: wp.array):
+        space, nodes = body.space, body.nodes
+        self._body, self._skin, self._outdated = body, skin, outdated
+        self._support = body.scene.numerics.smoothing.support
+        self._reference_density = body.scene.material.density
+        self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
+        self._listed = wp.zeros_like(nodes.displacement)
+        self._listed_h = wp.zeros_like(nodes.smoothing_length)
+        self._move, self._centre = _move_kernel(space), centre_kernel(space, body.kind)
+        self.kernels = (self._move, self._centre)
 
-    def mark(self, nodes, auxiliary) -> None:
+    def mark(self) -> None:
         """Remember where the nodes are now: the pair lists were just built for this."""
-        if self._initial_smoothing_length is None:
-            self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
-        wp.copy(self._listed, nodes.displacement)
-        wp.copy(self._listed_h, nodes.smoothing_length)
-        self._outdated.zero_()
+        wp.copy(self._listed, self._body.nodes.displacement)
+        wp.copy(self._listed_h, self._body.nodes.smoothing_length)
 
-    def shrinkage(self, nodes, auxiliary) -> float:
+    def shrinkage(self) -> float:
         """1: the published schemes keep their step, since their viscosity depends on it."""
         return 1.0
 
-    def move(self, nodes, auxiliary, dt: wp.array) -> None:
+    def move(self, dt: wp.array) -> None:
         """x ← x + Δt v^{n+1/2}, ρ ← ρ/(change of volume), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""
+        nodes, auxiliary, launch = self._body.nodes, self._body.auxiliary, self._body.launcher.launch
         inputs = [self._reference_density, self._initial_smoothing_length, self._support, 0.5 * self._skin, dt]
         inputs += [self._listed, self._listed_h, nodes, self._outdated]
-        self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
-        self._launcher.launch(self._centre, auxiliary.point, [nodes, auxiliary])
+        launch(self._move, nodes.point, inputs, gathers=False)
+        launch(self._centre, auxiliary.point, [nodes, auxiliary])
 
 
 @cache
 def half_step_gradient(space: Space) -> wp.Function:
     """(∇φ in the configuration of tⁿ, Δt) → (∇φ in that of t^{n+1/2}, its volume over that of tⁿ)."""
-    dim, real, phi = space.dim, space.real, space.phi
-    velocity_gradient, determinant = phi.velocity_gradient, space.algebra.determinant
-    identity = space.mat(dim, dim)(np.eye(dim))
+    identity = space.types.tensor(np.eye(space.dim))
 
     @wp.func
-    def to_half_step(gradient: phi.gradient, dt: real):
-        stretch = identity + (real(0.5) * dt) * velocity_gradient(gradient)
-        if wp.static(dim == 1):
+    def to_half_step(gradient: space.phi.gradient, dt: space.real):
+        stretch = identity + (space.real(0.5) * dt) * space.phi.velocity_gradient(gradient)
+        if wp.static(space.dim == 1):
             return gradient / stretch[0, 0], stretch[0, 0]
         else:
-            return gradient * wp.inverse(stretch), determinant(stretch)
+            return gradient * wp.inverse(stretch), space.algebra.determinant(stretch)
 
     return to_half_step
 
@@ -99,22 +92,17 @@ def half_step_gradient(space: Space) -> wp.Function:
 @cache
 def initial_gradient(space: Space) -> wp.Function:
     """The same for small displacements: the initial configuration is the only one."""
-    phi, real = space.phi, space.real
 
     @wp.func
-    def unchanged(gradient: phi.gradient, dt: real):
-        return gradient, real(1.0)
+    def unchanged(gradient: space.phi.gradient, dt: space.real):
+        return gradient, space.real(1.0)
 
     return unchanged
 
 
 @cache
 def _move_kernel(space: Space):
-    types = space.types
-    real, vector, MaterialNodes = space.real, types.vector, types.MaterialNodes
-    dim = space.dim
-    determinant = space.algebra.determinant
-    identity = types.tensor(np.eye(dim))
+    real, identity = space.real, space.types.tensor(np.eye(space.dim))
 
     @forward_kernel
     def move(
@@ -124,9 +112,9 @@ def _move_kernel(space: Space):
         support: real,
         half_skin: real,
         dt: wp.array(dtype=real),
-        listed: wp.array(dtype=vector),
+        listed: wp.array(dtype=space.types.vector),
         listed_h: wp.array(dtype=real),
-        nodes: MaterialNodes,
+        nodes: space.types.MaterialNodes,
         outdated: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
@@ -134,9 +122,10 @@ def _move_kernel(space: Space):
         # The exact change of volume of the map xⁿ → xⁿ + Δt v, whose gradient is (1 + ½ΔtL)(1 − ½ΔtL)⁻¹ when L
         # refers to the half step; to first order 1 + Δt tr(d).
         half_stretch = real(0.5) * dt[0] * nodes.velocity_gradient[i]
-        volume_ratio = determinant(identity + half_stretch) / determinant(identity - half_stretch)
+        grown, shrunk = identity + half_stretch, identity - half_stretch
+        volume_ratio = space.algebra.determinant(grown) / space.algebra.determinant(shrunk)
         density = nodes.density[i] / volume_ratio
-        h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / dim)))
+        h = initial_smoothing_length[i] * wp.pow(reference_density / density, real(wp.static(1.0 / space.dim)))
         nodes.displacement[i] = u
         nodes.point[i].x = nodes.reference[i] + u
         nodes.volume[i] = nodes.weight[i] / density
@@ -150,25 +139,22 @@ def _move_kernel(space: Space):
 
 
 @cache
-def centre_kernel(space: Space):
+def centre_kernel(space: Space, kind: CellKind):
     """Places auxiliary nodes in the middle of their cells, with mean volume, density and smoothing length."""
-    types = space.types
-    real, vector = space.real, types.vector
-    MaterialNodes, AuxiliaryNodes = types.MaterialNodes, types.AuxiliaryNodes
-    corners = 2**space.dim
+    real = space.real
 
     @forward_kernel
-    def centre(first: int, nodes: MaterialNodes, auxiliary: AuxiliaryNodes):
+    def centre(first: int, nodes: space.types.MaterialNodes, auxiliary: space.types.AuxiliaryNodes):
         a = first + wp.tid()
-        x = vector()
+        x = space.types.vector()
         volume, density, h = real(0.0), real(0.0), real(0.0)
-        for k in range(wp.static(corners)):
+        for k in range(wp.static(kind.corners)):
             i = auxiliary.cell[a, k]
             x += nodes.point[i].x
             volume += nodes.volume[i]
             density += nodes.density[i]
             h += nodes.smoothing_length[i]
-        share = real(wp.static(1.0 / corners))
+        share = real(wp.static(1.0 / kind.corners))
         auxiliary.point[a].x = share * x
         auxiliary.volume[a] = share * volume
         auxiliary.density[a] = share * density

@@ -9,7 +9,6 @@ for any value φ_I of the point itself. The sums are taken of differences from a
 neighbour stand side by side and are added up as one row.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -17,32 +16,26 @@ import warp as wp
 
 from ..device.arrays import natural, packed
 from ..device.rows import add_outer
-from ..physics.smoothing import SMOOTHING_FUNCTIONS
 from ..physics.space import Space
-from ..scene.numerics import KERNELS
+from ..scene.smoothing import SmoothingKernel
 from ..state.pairs import PairList
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """The functions of one pass.
+class NeighbourSums:
+    """The functions of one pass over the neighbours.
 
     Attributes:
         collect: (target index, its x and metric M, base value, pair list, source points, their volumes) → Sums.
             ξ² = |M r|²: M = 1/h for a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes
             MᵀM out of ∇W again.
         value: Sums → Shepard value; the base value where no neighbour is left.
-        round_metric: h → 1/h.
-        cell_metric: h/Δx → (∇ξ of the cells, h) → M of a kernel that is stretched and turned with them (as in
-            adaptive SPH, Owen et al. 1998); 1/h where they have folded.
         gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
     """
 
     collect: wp.Function
     value: wp.Function
     gradient: wp.Function
-    round_metric: wp.Function
-    cell_metric: Callable[[float], wp.Function]
 
 
 # A neighbour on the very edge of the support is outside, whatever its last bits say: at h = 0.5 Δx the Gaussian's
@@ -61,69 +54,31 @@ def batch_on(device: wp.Device) -> int:
 
 
 @cache
-def sweep(space: Space, kernel: str, batch: int = CPU_BATCH) -> Sweep:
-    """The pass for one smoothing function, with so many neighbours' weights found at a time.
-
-    Loops are written with `while` and without branches, since that is what compilers turn into SIMD.
-    """
-    types = space.types
-    real, vector, tensor, phi = space.real, types.vector, types.tensor, types.phi
-    Point, dim, length = types.Point, space.dim, space.dim + types.size
-    row, rows, with_outer = (
-        space.vec(length),
-        space.mat(dim, length),
-        add_outer(dim, length, space.precision),
-    )
-    real_batch = space.vec(batch)
-    weights = SMOOTHING_FUNCTIONS[kernel](space.precision)
-    inverse = space.algebra.symmetric_inverse
-    support_squared = EDGE * KERNELS[kernel].support ** 2
-    packed_points, packed_volumes, packed_list = (
-        packed(arrays) for arrays in (wp.array(dtype=Point), wp.array(dtype=real), PairList)
-    )
+def neighbour_sums(space: Space, kernel: SmoothingKernel, batch: int = CPU_BATCH) -> NeighbourSums:
+    """The pass for one smoothing kernel, with so many neighbours' weights found at a time."""
+    types, real = space.types, space.real
+    length = space.dim + types.size
+    row, with_outer = space.vec(length), add_outer(space.dim, length, space.precision)
+    weigh, neighbour = _weigh(space, kernel, batch)
+    packed_points, packed_volumes = packed(wp.array(dtype=types.Point)), packed(wp.array(dtype=real))
+    packed_list = packed(PairList)
 
     @wp.struct
     class Sums:
-        base: phi
+        base: types.phi
         w: real  # Σ V W
         w_d: row  # Σ V W d, d = (x_J − x_I, φ_J − base)
-        g: vector  # Σ V ∇W
-        g_d: rows  # Σ V ∇W ⊗ d
-
-    @wp.func
-    def neighbour(place: int, pairs: PairList):
-        natural(place)
-        j = pairs.index[place]
-        natural(j)
-        return j
-
-    @wp.func
-    def weigh(x: vector, metric: tensor, first: int, count: int, pairs: PairList, sources: wp.array(dtype=Point)):
-        """W and −W′/ξ of so many neighbours from `first` on, zero outside the support."""
-        packed_points(sources)
-        packed_list(pairs)
-        xi2, w, g = real_batch(), real_batch(), real_batch()
-        n = wp.int32(0)
-        while n < count:
-            xi = metric * (sources[neighbour(first + n, pairs)].x - x)
-            xi2[n] = wp.dot(xi, xi)
-            n += 1
-        n = wp.int32(0)
-        while n < wp.static(batch):
-            w_n, g_n = weights(xi2[n])
-            w[n] = wp.where(xi2[n] < real(support_squared), w_n, real(0.0))
-            g[n] = wp.where(xi2[n] < real(support_squared), g_n, real(0.0))
-            n += 1
-        return w, g
+        g: types.vector  # Σ V ∇W
+        g_d: space.mat(space.dim, length)  # Σ V ∇W ⊗ d
 
     @wp.func
     def collect(
         target: int,
-        x: vector,
-        metric: tensor,
-        base: phi,
+        x: types.vector,
+        metric: types.tensor,
+        base: types.phi,
         pairs: PairList,
-        sources: wp.array(dtype=Point),
+        sources: wp.array(dtype=types.Point),
         volume: wp.array(dtype=real),
     ):
         packed_points(sources)
@@ -141,8 +96,8 @@ def sweep(space: Space, kernel: str, batch: int = CPU_BATCH) -> Sweep:
                 point = sources[j]
                 r = point.x - x
                 d = row()
-                d[: wp.static(dim)] = r
-                d[wp.static(dim) :] = point.phi - base
+                d[: wp.static(space.dim)] = r
+                d[wp.static(space.dim) :] = point.phi - base
                 w_n, g_n = w[n] * volume[j], g[n] * volume[j]
                 grad_w = g_n * r
                 sums.w += w_n
@@ -157,28 +112,87 @@ def sweep(space: Space, kernel: str, batch: int = CPU_BATCH) -> Sweep:
     def value(sums: Sums):
         result = sums.base
         if sums.w > real(0.0):
-            result += sums.w_d[wp.static(dim) :] / sums.w
+            result += sums.w_d[wp.static(space.dim) :] / sums.w
         return result
 
     @wp.func
-    def gradient(sums: Sums, own: phi):
-        a, b = sums.g_d[:, : wp.static(dim)], sums.g_d[:, wp.static(dim) :]
-        return wp.transpose(inverse(a) * (b - wp.outer(sums.g, own - sums.base)))
+    def gradient(sums: Sums, own: types.phi):
+        a, b = sums.g_d[:, : wp.static(space.dim)], sums.g_d[:, wp.static(space.dim) :]
+        return wp.transpose(space.algebra.symmetric_inverse(a) * (b - wp.outer(sums.g, own - sums.base)))
+
+    return NeighbourSums(collect, value, gradient)
+
+
+@cache
+def _weigh(space: Space, kernel: SmoothingKernel, batch: int) -> tuple[wp.Function, wp.Function]:
+    """W and −W′/ξ of so many neighbours at a time, and the index of one.
+
+    Loops are written with `while` and without branches, since that is what compilers turn into SIMD.
+    """
+    real, numbers, weights = space.real, space.vec(batch), kernel.weights(space.precision)
+    support_squared = EDGE * kernel.support**2
+    packed_points, packed_list = packed(wp.array(dtype=space.types.Point)), packed(PairList)
 
     @wp.func
-    def round_metric(h: real):
-        metric = tensor()
-        for k in range(wp.static(dim)):
-            metric[k, k] = real(1.0) / h
+    def neighbour(place: int, pairs: PairList):
+        natural(place)
+        j = pairs.index[place]
+        natural(j)
+        return j
+
+    @wp.func
+    def weigh(
+        x: space.types.vector,
+        metric: space.types.tensor,
+        first: int,
+        count: int,
+        pairs: PairList,
+        sources: wp.array(dtype=space.types.Point),
+    ):
+        """W and −W′/ξ of so many neighbours from `first` on, zero outside the support."""
+        packed_points(sources)
+        packed_list(pairs)
+        xi2, w, g = numbers(), numbers(), numbers()
+        n = wp.int32(0)
+        while n < count:
+            xi = metric * (sources[neighbour(first + n, pairs)].x - x)
+            xi2[n] = wp.dot(xi, xi)
+            n += 1
+        n = wp.int32(0)
+        while n < wp.static(batch):
+            w_n, g_n = weights(xi2[n])
+            w[n] = wp.where(xi2[n] < real(support_squared), w_n, real(0.0))
+            g[n] = wp.where(xi2[n] < real(support_squared), g_n, real(0.0))
+            n += 1
+        return w, g
+
+    return weigh, neighbour
+
+
+@cache
+def round_metric(space: Space) -> wp.Function:
+    """h → M = 1/h, of a round kernel."""
+
+    @wp.func
+    def metric_of(h: space.real):
+        metric = space.types.tensor()
+        for k in range(wp.static(space.dim)):
+            metric[k, k] = space.real(1.0) / h
         return metric
 
-    def cell_metric(ratio: float):
-        @wp.func
-        def metric_of(frame: tensor, h: real):
-            if wp.ddot(frame, frame) <= real(0.0):
-                return round_metric(h)
-            return real(wp.static(1.0 / ratio)) * frame
+    return metric_of
 
-        return metric_of
 
-    return Sweep(collect, value, gradient, round_metric, cell_metric)
+@cache
+def cell_metric(space: Space, ratio: float) -> wp.Function:
+    """(∇ξ of the cells, h) → M of a kernel with h/Δx = ratio that is stretched and turned with the cells (as in
+    adaptive SPH, Owen et al. 1998); 1/h where they have folded."""
+    round_one = round_metric(space)
+
+    @wp.func
+    def metric_of(frame: space.types.tensor, h: space.real):
+        if wp.ddot(frame, frame) <= space.real(0.0):
+            return round_one(h)
+        return space.real(wp.static(1.0 / ratio)) * frame
+
+    return metric_of

@@ -16,6 +16,7 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
+from ..errors import SceneError
 from ..materials.law import Law
 from ..physics.space import Space
 from ..scene.scene import Scene
@@ -42,17 +43,15 @@ class Sources:
     Args:
         scene: the scene.
         law: its material law, with the filled `parameters`.
-        integrator: one of `STRESS_INTEGRATORS`.
     """
 
-    def __init__(self, scene: Scene, law: Law, parameters, space: Space, launcher: Launcher, integrator):
-        self._parameters, self._launcher = parameters, launcher
-        self._damping = scene.damping
-        flows, turns = law.flow is not None, spins(scene)
+    def __init__(self, scene: Scene, law: Law, parameters, space: Space, launcher: Launcher):
+        self._parameters, self._launcher, self._damping = parameters, launcher, scene.damping
+        integrator = STRESS_INTEGRATORS[scene.numerics.source_scheme]
         self._kernel = source_kernel(
             space,
             law,
-            integrator(space, law, turns) if flows or turns else None,
+            advance_stress=integrator(space, law, spins(scene)) if law.flows or spins(scene) else None,
             accelerates=scene.body_force is not None or scene.damping > 0.0,
         )
         self.kernels = (self._kernel,)
@@ -75,10 +74,18 @@ def spins(scene: Scene) -> bool:
 
 
 def sources(scene: Scene, law: Law, parameters, space: Space, launcher: Launcher) -> Sources | NoSources:
-    """The sources of a scene by the scheme it names; an object that does nothing when it has none."""
-    if law.flow is None and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
+    """The sources of a scene by the scheme it names; an object that does nothing when it has none.
+
+    Raises:
+        SceneError: the law can not be integrated by that scheme.
+    """
+    scheme = scene.numerics.source_scheme
+    if scheme not in law.source_schemes:
+        takes = ", ".join(law.source_schemes)
+        raise SceneError("source_scheme", scheme, f"the law of {type(scene.material).__name__} takes {takes} only")
+    if not law.flows and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
         return NoSources()
-    return Sources(scene, law, parameters, space, launcher, STRESS_INTEGRATORS[scene.numerics.source_scheme])
+    return Sources(scene, law, parameters, space, launcher)
 
 
 def internals_type(law: Law, space: Space) -> type:
@@ -89,19 +96,16 @@ def internals_type(law: Law, space: Space) -> type:
 @cache
 def analytic(space: Space, law: Law, spins: bool) -> wp.Function:
     """(σ, internals, L, material, Δt) → the same after exact rotation and, with flow, the law's relaxation."""
-    types, internal = space.types, internals_type(law, space)
-    real, Parameters = space.real, law.Parameters
-    rotation = space.algebra.rotation
-    transform, relax, flows = space.stress.transform, law.relax, law.flow is not None
+    types, real, internal = space.types, space.real, internals_type(law, space)
 
     @wp.func
-    def advance(sigma: types.stress, start: internal, L: types.tensor, material: Parameters, dt: real):
+    def advance(sigma: types.stress, start: internal, L: types.tensor, material: law.Parameters, dt: real):
         result = sigma
         internals = start
         if wp.static(spins):
-            result = transform(result, rotation(L, dt))
-        if wp.static(flows):
-            result, internals = relax(result, internals, material, dt)
+            result = space.stress.transform(result, space.algebra.rotation(L, dt))
+        if wp.static(law.flows):
+            result, internals = law.relax(result, internals, material, dt)
         return result, internals
 
     return advance
@@ -110,23 +114,20 @@ def analytic(space: Space, law: Law, spins: bool) -> wp.Function:
 @cache
 def rk4(space: Space, law: Law, spins: bool) -> wp.Function:
     """(σ, internals, L, material, Δt) → (σ, internals) by RK4, sub-stepped as the stiffness of the flow asks."""
-    types, internal = space.types, internals_type(law, space)
-    real, stress, tensor = space.real, types.stress, types.tensor
-    spin, Parameters = space.stress.spin, law.Parameters
-    flow, flow_stiffness, flows = law.flow, law.flow_stiffness, law.flow is not None
+    types, real, internal = space.types, space.real, internals_type(law, space)
 
     @wp.func
-    def stress_rate(sigma: stress, internals: internal, L: tensor, material: Parameters):
-        rate = stress()
+    def stress_rate(sigma: types.stress, internals: internal, L: types.tensor, material: law.Parameters):
+        rate = types.stress()
         internals_rate = internal()
-        if wp.static(flows):
-            rate, internals_rate = flow(sigma, internals, material)
+        if wp.static(law.flows):
+            rate, internals_rate = law.flow(sigma, internals, material)
         if wp.static(spins):
-            rate += spin(sigma, L)
+            rate += space.stress.spin(sigma, L)
         return rate, internals_rate
 
     @wp.func
-    def rk4_stress(sigma: stress, internals: internal, L: tensor, material: Parameters, dt: real):
+    def rk4_stress(sigma: types.stress, internals: internal, L: types.tensor, material: law.Parameters, dt: real):
         half, sixth = real(0.5) * dt, dt / real(6.0)
         s1, h1 = stress_rate(sigma, internals, L, material)
         s2, h2 = stress_rate(sigma + half * s1, internals + half * h1, L, material)
@@ -138,16 +139,16 @@ def rk4(space: Space, law: Law, spins: bool) -> wp.Function:
         return sigma_new, internals_new
 
     @wp.func
-    def substep(sigma: stress, internals: internal, material: Parameters, left: real):
+    def substep(sigma: types.stress, internals: internal, material: law.Parameters, left: real):
         """The largest equal part of the time left that the stiffness here allows."""
-        if wp.static(flows):
-            parts = wp.ceil(flow_stiffness(sigma, internals, material) * left / real(STIFFNESS_LIMIT))
+        if wp.static(law.flows):
+            parts = wp.ceil(law.flow_stiffness(sigma, internals, material) * left / real(STIFFNESS_LIMIT))
             return left / wp.clamp(parts, real(1.0), real(MOST_SUBSTEPS))
         else:
             return left
 
     @wp.func
-    def advance(sigma: stress, start: internal, L: tensor, material: Parameters, dt: real):
+    def advance(sigma: types.stress, start: internal, L: types.tensor, material: law.Parameters, dt: real):
         result = sigma
         internals = start
         left = dt
@@ -164,21 +165,13 @@ STRESS_INTEGRATORS = {"rk4": rk4, "analytic": analytic}
 
 
 @cache
-def source_kernel(
-    space: Space,
-    law: Law,
-    advance_stress: wp.Function | None,
-    accelerates: bool,
-):
+def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None, accelerates: bool):
     """The kernel that applies the sources a scene has, and no others."""
-    m, acts_on_stress = len(law.internals), advance_stress is not None
-    types, phi = space.types, space.phi
-    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    real, vector, internal = space.real, types.vector, internals_type(law, space)
-    Parameters, MaterialNodes = law.Parameters, types.MaterialNodes
+    types, real, internal = space.types, space.real, internals_type(law, space)
+    remembers = len(law.internals) > 0
 
     @wp.func
-    def rk4_velocity(v: vector, b0: vector, b1: vector, b2: vector, c: real, dt: real):
+    def rk4_velocity(v: types.vector, b0: types.vector, b1: types.vector, b2: types.vector, c: real, dt: real):
         half = real(0.5) * dt
         v1 = b0 - c * v
         v2 = b1 - c * (v + half * v1)
@@ -189,27 +182,27 @@ def source_kernel(
     @forward_kernel
     def source_half_step(
         first: int,
-        material: Parameters,
-        body_force: wp.array(dtype=vector),
+        material: law.Parameters,
+        body_force: wp.array(dtype=types.vector),
         damping: real,
         dt: wp.array(dtype=real),
-        nodes: MaterialNodes,
+        nodes: types.MaterialNodes,
         internals: wp.array(dtype=internal),
     ):
         i = first + wp.tid()
         half = real(0.5) * dt[0]
         point = nodes.point[i]
-        v = velocity_of(point.phi)
-        sigma = stress_of(point.phi)
+        v = space.phi.velocity(point.phi)
+        sigma = space.phi.stress(point.phi)
         if wp.static(accelerates):
             v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, half)
-        if wp.static(acts_on_stress):
+        if wp.static(advance_stress is not None):
             own = internal()
-            if wp.static(m > 0):
+            if wp.static(remembers):
                 own = internals[i]
             sigma, own = advance_stress(sigma, own, nodes.velocity_gradient[i], material, half)
-            if wp.static(m > 0):
+            if wp.static(remembers):
                 internals[i] = own
-        nodes.point[i].phi = join(v, sigma)
+        nodes.point[i].phi = space.phi.join(v, sigma)
 
     return source_half_step

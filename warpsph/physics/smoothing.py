@@ -13,8 +13,11 @@ import numpy as np
 import warp as wp
 from numpy.polynomial import Chebyshev, Polynomial
 
-from ..device.precision import Precision
-from ..scene.numerics import KERNELS
+from ..device.precision import PRECISIONS, Precision
+from ..scene.registry import register
+from ..scene.smoothing import SmoothingKernel
+
+GAUSSIAN_SUPPORT = 3.0
 
 
 @cache
@@ -25,8 +28,7 @@ def gaussian(precision: Precision) -> wp.Function:
     pair, and could not be taken for several neighbours at a time. Odd and even powers go side by side.
     """
     real, degree = precision.real, {"float32": 5, "float64": 9}[precision.name]
-    support_squared = KERNELS["gaussian"].support ** 2
-    root = Chebyshev.interpolate(lambda s: np.exp(-s / 16.0), degree, domain=[0.0, support_squared])
+    root = Chebyshev.interpolate(lambda s: np.exp(-s / 16.0), degree, domain=[0.0, GAUSSIAN_SUPPORT**2])
     c = precision.vec(degree + 1)(*root.convert(kind=Polynomial).coef)
 
     @wp.func
@@ -78,23 +80,26 @@ def wendland_c2(precision: Precision) -> wp.Function:
     return wendland_c2_weights
 
 
-# The names, supports and default smoothing ratios are in `warpsph.scene.numerics.KERNELS`.
-SMOOTHING_FUNCTIONS = {"gaussian": gaussian, "cubic_spline": cubic_spline, "wendland_c2": wendland_c2}
+# The ratios reach 1.8 Δx, a little beyond the 1.58 Δx (1.66 in 3D) that a corner node needs.
+register(SmoothingKernel(name="gaussian", support=GAUSSIAN_SUPPORT, smoothing_ratio=0.6, weights=gaussian))
+register(SmoothingKernel(name="cubic_spline", support=2.0, smoothing_ratio=0.9, weights=cubic_spline))
+register(SmoothingKernel(name="wendland_c2", support=2.0, smoothing_ratio=0.9, weights=wendland_c2))
 
 
-def second_moment(weight: wp.Function, precision: Precision, ratio: float, support: float, dim: int) -> float:
+def second_moment(kernel: SmoothingKernel, *, ratio: float, dim: int) -> float:
     """m₂ = Σ W x²/Σ W over the lattice points at ±½, ±3/2, … inside the support, in units of Δx² [-].
 
     The wave part of the step is stable for c_p Δt/Δx ≤ 2 √m₂ (METHOD section 4). Only the Gaussian, a product
     of functions along the axes, has nearly the same m₂ in every dimension.
 
     Args:
-        weight: one of `SMOOTHING_FUNCTIONS` in the given precision.
+        kernel: the smoothing kernel.
         ratio: h/Δx.
-        support: radius of the support over h.
         dim: number of space dimensions.
     """
-    row = [k + 0.5 for k in range(math.ceil(ratio * support))]
-    points = [x for x in product(row, repeat=dim) if sum(c * c for c in x) < (ratio * support) ** 2]
+    precision, reach = PRECISIONS["float64"], ratio * kernel.support
+    weight = kernel.weights(precision)
+    row = [k + 0.5 for k in range(math.ceil(reach))]
+    points = [x for x in product(row, repeat=dim) if sum(c * c for c in x) < reach**2]
     weights = [float(weight(precision.real(sum(c * c for c in x) / ratio**2))[0]) for x in points]
     return sum(w * x[0] ** 2 for w, x in zip(weights, points, strict=True)) / sum(weights)

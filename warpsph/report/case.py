@@ -1,9 +1,9 @@
-"""What a case of the report is made of: the runs it needs, and what it tells about them."""
+"""What a case of the report is made of: the runs it needs, and its section of the page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 
 from .prose import Prose
@@ -25,6 +25,7 @@ class Row:
 
     quantity: str
     ours: float | str
+    _: KW_ONLY
     unit: str = "-"
     paper: float | str | None = None
     exact: float | str | None = None
@@ -48,7 +49,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A further table: its caption, its header, and its lines (numbers or texts), the first column naming them."""
 
     caption: str
@@ -72,7 +73,7 @@ class Section:
     rows: Sequence[Row]
     pictures: Sequence[Picture]
     results: Sequence[Result]
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,10 @@ class Case:
     Attributes:
         name: of its pictures.
         runs: what it needs.
-        tell: its section, from its results (by the runs' names) and a function that gives the path of a picture.
+        section: makes its section from its results (by the runs' names) and a function that gives the path of a
+            picture.
     """
 
     name: str
     runs: tuple[Run, ...]
-    tell: Callable[[Mapping[str, Result], Callable[[str], Path]], Section]
+    section: Callable[[Mapping[str, Result], Callable[[str], Path]], Section]

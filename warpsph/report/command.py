@@ -1,53 +1,44 @@
-"""The report from end to end: what is missing is run, then everything is told."""
+"""The command `warpsph report`."""
 
 from __future__ import annotations
 
-import time as clock
+import argparse
+import sys
 from pathlib import Path
 
-from .. import __version__
-from ..cli.queue import make_missing, processes
-from ..simulation.device import choose_device
-from .cases import cases
-from .page import write_html, write_markdown
-
-TITLE = "Blanc and Pastor (2012), reproduced by warpsph"
+from ..cli.settings import MOST_THREADS
+from ..cli.stopping import interrupting
+from ..storage.owner import owned
+from ..validate import index
 
 
-def report(folder: Path, *, quick: bool, device: str | None, jobs: int, quiet: bool = False) -> Path:
-    """Make the report; returns the path of the HTML page.
+def add_parser(commands) -> None:
+    """Add the command to the others."""
+    reporting = commands.add_parser(
+        "report",
+        help="run every case of the paper and lay it out beside the paper's and the exact results",
+        description="Runs every case of the paper and writes report.html and report.md. Runs that a former call "
+        "of this version with these parameters has finished are kept; delete a run's folder to repeat it.",
+    )
+    reporting.add_argument("--quick", action="store_true", help="coarser and shorter where a case takes minutes")
+    reporting.add_argument(
+        "--out", metavar="DIR", help="folder of the report (default: runs/report, or report-quick)"
+    )
+    reporting.add_argument("--device", help="Warp device, e.g. cpu or cuda:0 (default: a GPU if there is one)")
+    reporting.add_argument("--jobs", type=int, default=2, help="runs at a time (default: 2)")
+    reporting.set_defaults(command=_report)
 
-    Args:
-        folder: gets `runs/` (a folder a run), `figures/`, `report.html` and `report.md`.
-        quick: coarser and shorter where a case takes minutes.
-        device: Warp device.
-        jobs: how many runs to make at a time.
-        quiet: whether to say nothing.
-    """
-    begin = clock.perf_counter()
-    chosen, figures = cases(quick), folder / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
-    device = choose_device(device).alias
-    runs = [run for case in chosen for run in case.runs]
-    for error in make_missing(runs, folder / "runs", device, processes(jobs), quiet).values():
-        raise error
-    sections, results = [], []
-    for case in chosen:
-        found = {run.name: run.read(folder / "runs" / run.name) for run in case.runs}
-        results += found.values()
-        sections.append(case.tell(found, lambda name, case=case: figures / f"{case.name}_{name}.png"))
-    seconds = sum(result.seconds for result in results)
-    lead = [
-        "T. Blanc, M. Pastor, A stabilized Runge-Kutta, Taylor smoothed particle hydrodynamics algorithm for "
-        "large deformation problems in dynamics, Int. J. Numer. Meth. Engng (2012), doi:10.1002/nme.4324.",
-        f"Every case by warpsph {__version__}, float64 on {results[0].summary['device_name']}, by the published "
-        f"velocity step unless said; {len(results)} runs, {seconds:.0f} s of run time. "
-        + ("**Quick form:** the slope is coarser and shorter, the finest spacings are left out. " if quick else "")
-        + "Differences are (ours − exact)/exact where there is an exact value, else to the paper's.",
-    ]
-    write_markdown(folder / "report.md", TITLE, lead, sections)
-    page = folder / "report.html"
-    write_html(page, TITLE, lead, sections)
-    if not quiet:
-        print(f"{page} and {folder / 'report.md'} written after {clock.perf_counter() - begin:.0f} s")
-    return page
+
+def _report(options: argparse.Namespace) -> int:
+    from .make import make_report  # all cases: slow to import
+
+    index("--jobs", options.jobs, at_least=1, below=MOST_THREADS + 1)
+    default = Path("runs") / ("report-quick" if options.quick else "report")
+    folder = Path(options.out or default)
+    try:
+        with owned(folder), interrupting():
+            make_report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
+    except KeyboardInterrupt:
+        print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
+        return 130
+    return 0

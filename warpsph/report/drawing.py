@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from ..export.plots import BRIGHT, DARK, DOTS_PER_INCH, beyond, colour_span, draw_cells
+from ..export.colours import beyond, colour_span
+from ..export.pictures.figures import BRIGHT, DARK, GREY, draw_cells, new_figure, save_picture
 from ..mesh.mesh import Mesh
 
-GREY = "#7f7f7f"
 LINES = ((DARK, "-"), (BRIGHT, "-"), (GREY, "-"), (DARK, ":"), (BRIGHT, ":"), (GREY, ":"))
 EXACT = {"color": "black", "linestyle": "--", "linewidth": 1.0}
 
@@ -30,28 +28,20 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """A field of a plane body: title, positions to draw it at [m] (n, 2), values (n,), lattice."""
+    """A field of a plane body: its title, the mesh as it is drawn, values at the nodes (n,)."""
 
     title: str
-    position: np.ndarray
-    values: np.ndarray
     mesh: Mesh
+    values: np.ndarray
 
 
-def new_figure(rows: int, columns: int, size: tuple[float, float], **options):
+def grid(rows: int, columns: int, *, size: tuple[float, float], **options):
     """A figure and its axes, an array (rows, columns)."""
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(size)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write the picture."""
-    figure.savefig(path, dpi=DOTS_PER_INCH, bbox_inches="tight")
-    return path
-
-
-def draw_curves(axes, curves: Sequence[Curve], x_label: str, y_label: str, above: bool = False) -> None:
+def draw_curves(axes, curves: Sequence[Curve], *, x_label: str, y_label: str, above: bool = False) -> None:
     """Draw lines into axes, their legend among them or above."""
     styles = iter(LINES)
     for curve in curves:
@@ -68,20 +58,20 @@ def draw_curves(axes, curves: Sequence[Curve], x_label: str, y_label: str, above
         axes.legend(frameon=False, fontsize=9, **place)
 
 
-def diagram(path: Path, curves: Sequence[Curve], x_label: str, y_label: str, **limits) -> Path:
+def diagram(path: Path, curves: Sequence[Curve], *, x_label: str, y_label: str, **limits) -> Path:
     """One diagram; `limits` are those of `Axes.set`, e.g. `ylim`."""
-    figure, axes = new_figure(1, 1, (7.0, 3.8))
-    draw_curves(axes[0, 0], curves, x_label, y_label, above=True)
+    figure, axes = grid(1, 1, size=(7.0, 3.8))
+    draw_curves(axes[0, 0], curves, x_label=x_label, y_label=y_label, above=True)
     axes[0, 0].set(**limits)
-    return save(figure, path)
+    return save_picture(figure, path)
 
 
-def fields(
+def draw_fields(
     path: Path,
     panels: Sequence[Sequence[Panel]],
+    *,
     label: str,
     size: tuple[float, float],
-    *,
     shared: bool = True,
     edges: bool = True,
 ) -> Path:
@@ -95,16 +85,16 @@ def fields(
         shared: whether all panels share one span of colours and one bar.
         edges: whether to draw the cells.
     """
-    figure, axes = new_figure(len(panels), len(panels[0]), size, sharex=True, sharey=True)
+    figure, axes = grid(len(panels), len(panels[0]), size=size, sharex=True, sharey=True)
     drawn = [(axes[i, k], panel) for i, row in enumerate(panels) for k, panel in enumerate(row)]
-    low = np.min([panel.position.min(axis=0) for _, panel in drawn], axis=0)
-    high = np.max([panel.position.max(axis=0) for _, panel in drawn], axis=0)
+    low = np.min([panel.mesh.nodes.min(axis=0) for _, panel in drawn], axis=0)
+    high = np.max([panel.mesh.nodes.max(axis=0) for _, panel in drawn], axis=0)
     margin = 0.03 * (high - low).max()
     everything = np.concatenate([panel.values for _, panel in drawn])
     for at, panel in drawn:
         values = everything if shared else panel.values
         span = colour_span(values)
-        colours = draw_cells(at, panel.position, panel.values, panel.mesh, span, edges)
+        colours = draw_cells(at, panel.mesh, panel.values, span=span, edges=edges)
         at.set_title(panel.title, fontsize=10)
         at.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
         at.label_outer()
@@ -112,4 +102,4 @@ def fields(
             figure.colorbar(colours, ax=at, label=label, extend=beyond(values, span), shrink=0.9)
     if shared:
         figure.colorbar(colours, ax=axes, label=label, extend=beyond(everything, span), shrink=0.8, aspect=30)
-    return save(figure, path)
+    return save_picture(figure, path)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from .case import Row, Section, Table
+from .case import ReportTable, Row, Section
 
 HEADER = ("quantity", "unit", "paper", "exact", "ours", "difference", "run time")
 CHECKS = ("run", "check", "value", "reference", "unit", "error", "bound", "")
@@ -36,7 +36,7 @@ PAGE = """<!doctype html>
 """
 
 
-def write_markdown(path: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+def write_markdown(path: Path, sections: Sequence[Section], *, title: str, lead: Sequence[str]) -> None:
     """The Markdown file; pictures are referred to by their place beside it."""
     lines = [f"# {title}", ""]
     for text in lead:
@@ -58,7 +58,7 @@ def write_markdown(path: Path, title: str, lead: Sequence[str], sections: Sequen
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
-def write_html(path: Path, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+def write_html(path: Path, sections: Sequence[Section], *, title: str, lead: Sequence[str]) -> None:
     """The HTML page, its pictures inside."""
     parts = [f"<h1>{html.escape(title)}</h1>", *(f"<p>{_inline(text)}</p>" for text in lead), "<ul>"]
     parts += [f'<li><a href="#s{k}">{_inline(section.prose.title)}</a></li>' for k, section in enumerate(sections)]
@@ -106,7 +106,7 @@ def shown(value: float | str | None) -> str:
     return f"{value:.5g}" if abs(value) >= 1e3 else f"{value:.4g}"
 
 
-def _texts(table: Table) -> list[tuple[str, ...]]:
+def _texts(table: ReportTable) -> list[tuple[str, ...]]:
     return [tuple(shown(value) for value in line) for line in table.lines]
 
 

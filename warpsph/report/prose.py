@@ -23,8 +23,8 @@ def prose(name: str, **numbers: float | str) -> Prose:
     The file: `# title`, paragraphs, `## Differences`, paragraphs.
     """
     text = (TEXTS / f"{name}.md").read_text(encoding="utf-8").format(**numbers)
-    told, _, differences = text.partition("## Differences")
-    title, *paragraphs = _paragraphs(told)
+    words, _, differences = text.partition("## Differences")
+    title, *paragraphs = _paragraphs(words)
     return Prose(title.removeprefix("# "), "\n\n".join(paragraphs), tuple(_paragraphs(differences)))
 
 

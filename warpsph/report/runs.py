@@ -112,7 +112,7 @@ class Result:
 
     @property
     def mesh(self) -> Mesh:
-        """Its initial lattice."""
+        """Its initial mesh."""
         return self.scene.mesh
 
     @property
@@ -133,3 +133,7 @@ class Result:
     def at(self, field: str, frame: int = -1) -> np.ndarray:
         """A field of a frame."""
         return self.frames[frame].field(field)
+
+    def moved(self, frame: int = -1, *, magnified: float = 1.0) -> Mesh:
+        """Its mesh at a frame, displacements magnified."""
+        return self.mesh.with_nodes(self.mesh.nodes + magnified * self.at("displacement", frame))

@@ -5,24 +5,28 @@ from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
-from .material import Elastic, PerzynaVonMises
-from .numerics import KERNELS, PUBLISHED, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .material import Material
+from .numerics import PUBLISHED, SOURCE_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
 from .parameter import Parameter
+from .registry import KERNELS, MATERIALS, register
 from .resolve import BoundaryTable
 from .scene import BodyForce, Scene
+from .scheme import SCHEMES, Scheme
 from .selection import edge, everywhere, region, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
+from .smoothing import SmoothingKernel
 
 __all__ = [
     "BAR",
     "CONTINUA",
     "KERNELS",
+    "MATERIALS",
     "PLANE_STRAIN",
     "PUBLISHED",
+    "SCHEMES",
     "SOLID",
     "SOURCE_SCHEMES",
-    "VELOCITY_SCHEMES",
     "BodyForce",
     "BoundaryTable",
     "Box",
@@ -31,17 +35,16 @@ __all__ = [
     "Continuum",
     "Disc",
     "EdgeForce",
-    "Elastic",
     "Fixed",
     "Free",
     "FreeSurface",
     "Linear",
     "Mapped",
+    "Material",
     "NodeValue",
     "Numerics",
     "Output",
     "Parameter",
-    "PerzynaVonMises",
     "Polygon",
     "PrescribedVelocity",
     "Probe",
@@ -50,10 +53,13 @@ __all__ = [
     "Roller",
     "Rotating",
     "Scene",
+    "Scheme",
     "Shape",
+    "SmoothingKernel",
     "Table",
     "edge",
     "everywhere",
     "region",
+    "register",
     "where",
 ]

@@ -20,9 +20,9 @@ from ..validate import choice
 from .condition import Condition, EdgeCondition
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
-from .material import Elastic
 from .numerics import Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
+from .registry import MATERIALS
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
 from .shape import Mapped, Placed, Shape
@@ -41,7 +41,7 @@ INITIAL_FIELDS = ("velocity", "stress")
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class InitialField:
     """An initial field by its values: one part a component, each a number or an array of one value a node."""
 
     parts: tuple
@@ -88,7 +88,7 @@ def _encode(value: object, path: str, scene: Scene, arrays: dict) -> object:
     if isinstance(value, np.ndarray):
         arrays[path] = value
         return {"values": path}
-    if type(value) not in types().values():
+    if not _is_known(type(value)):
         return {"code": path}
     plain = type(value) in PLAIN.values()
     table = {} if plain else {"type": type(value).__name__}
@@ -128,7 +128,7 @@ class _Reader:
         values = self.value(value, name)
         if not isinstance(values, np.ndarray | tuple):
             raise SceneError(name, value, "it must be a list of numbers, one a component, or {values = NAME}")
-        return Field(tuple(values.T if isinstance(values, np.ndarray) else values))
+        return InitialField(tuple(values.T if isinstance(values, np.ndarray) else values))
 
     def value(self, value: object, path: str) -> object:
         """A value at a place."""
@@ -178,11 +178,21 @@ def _follow(scene: object, path: str) -> object:
     return value
 
 
-@cache
 def types() -> dict[str, type]:
-    """The classes a document may name."""
+    """The classes a document may name: the package's own parts, and the materials that are registered."""
+    return MATERIALS | _parts()
+
+
+def _is_known(kind: type) -> bool:
+    """Whether a document may name a class; also one that the same code has replaced since, read again."""
+    known = types().get(kind.__name__)
+    return known is not None and (known.__module__, known.__qualname__) == (kind.__module__, kind.__qualname__)
+
+
+@cache
+def _parts() -> dict[str, type]:
     found = [Linear, Ramp, Pulse, Table, NodeValue, EdgeForce, *PLAIN.values()]
-    waiting = [Shape, Elastic, Condition, Selection]
+    waiting = [Shape, Condition, Selection]
     while waiting:
         kind = waiting.pop()
         waiting += kind.__subclasses__()

@@ -17,8 +17,9 @@ SAMPLES = 257
 def fingerprint(scene: Scene) -> str:
     """SHA-256 of the resolved scene as hexadecimal digits.
 
-    Nodes, cells, resolved conditions, initial fields, material, numerics, loads and the history's columns count;
-    names, pictures and checks do not. What the probes compute is in `Scene.probe_identities`.
+    Nodes, cells, resolved conditions, initial fields, material (functions of position by the initial values they
+    give), numerics, loads and the history's columns count; names, pictures and checks do not. What the probes
+    compute is in `Scene.probe_identities`.
     """
     digest = hashlib.sha256()
     for name, value in _parts(scene):
@@ -40,7 +41,10 @@ def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
     yield from (("velocity", scene.initial_velocity), ("stress", scene.initial_stress))
     force = scene.body_force
     yield "body_force", None if force is None else np.array([force(t) for t in times])
-    for name in ("material", "numerics", "damping", "large_displacements", "free_surface", "duration"):
+    material = scene.material
+    own = {name: value for name, value in vars(material).items() if not callable(value)}
+    yield from (("material", (type(material).__name__, own)), ("internals", scene.initial_internals))
+    for name in ("numerics", "damping", "large_displacements", "free_surface", "duration"):
         yield name, getattr(scene, name)
     yield "columns", [(probe.name, probe.unit) for probe in output.probes]
     yield "interval", output.interval

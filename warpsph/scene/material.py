@@ -1,120 +1,134 @@
-"""Materials a user can name. The laws themselves are in `warpsph.materials`."""
+"""What a scene must know of a material. Materials themselves, with their laws, are in `warpsph.materials`."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import MISSING, dataclass, field, fields, replace
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
-from ..mesh.continuum import Continuum
-from ..validate import number
+from ..errors import SceneError
+from ..mesh.continuum import CONTINUA, Continuum
+from ..validate import field_of_position, number
+
+
+@dataclass(frozen=True)
+class InternalVariable:
+    """What a node remembers of its material beside the stress; a field of the nodes, and kept in checkpoints.
+
+    Attributes:
+        name: its name as a field.
+        unit: its unit, `-` for none.
+        meaning: one line.
+        initial: its value at the start: a number, or a function (material, x, y, …) → a number or one value a
+            node, for what a parameter sets or what varies with the initial position.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    initial: float | Callable = 0.0
+
+
+@dataclass(frozen=True)
+class DerivedField:
+    """A field of the nodes that follows from their stresses and internal variables.
+
+    Attributes:
+        name: its name as a field.
+        unit: its unit, `-` for none.
+        meaning: one line.
+        values: (stress (n, s), internals (n, m), material) → values, shape (n,); all NumPy.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    values: Callable[[np.ndarray, np.ndarray, Material], np.ndarray]
+
+
+def parameter(unit: str, meaning: str, *, default: object = MISSING, **bounds: float):
+    """A parameter of a material: the one place of its unit, its meaning and its bounds, those of `number`."""
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "bounds": bounds})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Elastic:
-    """Isotropic linear elasticity.
+class Material(ABC):
+    """A material: its parameters, checked, and how fast its waves and its flow are.
 
-    Args:
-        young_modulus: E [Pa], > 0.
-        poisson_ratio: ν [-], in (−1, 0.5); unused by a bar, which is in uniaxial stress.
-        density: ρ [kg/m³], > 0.
+    A subclass is a frozen dataclass with a `parameter` each; it also says its law, for the kernels.
+
+    Attributes:
+        continua: names of the continua that its law knows.
+        internals: its internal variables, in the order in which the law has them.
+        derived: what can be read from stresses and internal variables as further fields.
 
     Raises:
         SceneError: a parameter is not allowed.
-
-    >>> Elastic(young_modulus=8e7, density=2000.0).wave_speed(dim=1)
-    200.0
-    >>> Elastic(young_modulus=8e7, density=-1.0)
-    Traceback (most recent call last):
-    warpsph.errors.SceneError: density = -1.0 is not allowed: it must be a finite number above 0.0
     """
 
-    young_modulus: float
-    density: float
-    poisson_ratio: float = 0.0
+    continua: ClassVar[tuple[str, ...]] = tuple(continuum.name for continuum in CONTINUA.values())
+    internals: ClassVar[tuple[InternalVariable, ...]] = ()
+    derived: ClassVar[tuple[DerivedField, ...]] = ()
+
+    density: float = parameter("kg/m³", "density ρ", above=0.0)
 
     def __post_init__(self):
-        self._check("young_modulus", above=0.0)
-        self._check("density", above=0.0)
-        self._check("poisson_ratio", above=-1.0, below=0.5)
+        for entry in fields(self):
+            if "bounds" in entry.metadata:
+                self.require(entry.name, **entry.metadata["bounds"])
 
-    def _check(self, field: str, **bounds: float) -> None:
-        object.__setattr__(self, field, number(field, getattr(self, field), **bounds))
+    def require(self, name: str, **bounds: float) -> None:
+        """Refuse a parameter that is no finite number within bounds `above`, `below`, `at_least`, `at_most`.
 
-    @property
-    def shear_modulus(self) -> float:
-        """G = E / (2 (1 + ν)) [Pa]."""
-        return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
+        Raises:
+            SceneError: it is none.
+        """
+        object.__setattr__(self, name, number(name, getattr(self, name), **bounds))
 
-    @property
-    def lame_modulus(self) -> float:
-        """λ = E ν / ((1 + ν)(1 − 2ν)) [Pa]."""
-        nu = self.poisson_ratio
-        return self.young_modulus * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    def with_parameters(self, values: object) -> Material:
+        """The material with what `values`, a scene's p, has of its parameters; see `Parameter.of`."""
+        given = {entry.name: getattr(values, entry.name) for entry in fields(self) if hasattr(values, entry.name)}
+        return replace(self, **given)
 
-    def stiffness(self, continuum: Continuum) -> np.ndarray:
-        """Dₑ [Pa] from strains (engineering shear) to the stored stresses, shape (s, s); E for a bar."""
-        if continuum.dim == 1:
-            return np.array([[self.young_modulus]])
-        normal = np.array([i == j for i, j in continuum.pairs])
-        shear = self.shear_modulus * np.where(normal, 2.0, 1.0)
-        return self.lame_modulus * np.outer(normal, normal) + np.diag(shear)
-
+    @abstractmethod
     def wave_speed(self, dim: int) -> float:
-        """Speed of the fastest wave [m/s]: √(E/ρ) in a bar, √((λ + 2G)/ρ) otherwise."""
-        modulus = self.young_modulus if dim == 1 else self.lame_modulus + 2.0 * self.shear_modulus
-        return math.sqrt(modulus / self.density)
+        """Speed of the fastest wave in so many dimensions [m/s], for the step limit."""
 
-    def shear_wave_speed(self) -> float:
-        """√(G/ρ) [m/s]."""
-        return math.sqrt(self.shear_modulus / self.density)
-
-    def relaxation_modulus(self, dim: int) -> float:
-        """−dq/dε̄ at fixed strain [Pa]: how fast inelastic flow relaxes q; E in a bar, 3G otherwise."""
-        return self.young_modulus if dim == 1 else 3.0 * self.shear_modulus
+    @abstractmethod
+    def stiffness(self, continuum: Continuum) -> np.ndarray:
+        """Dₑ [Pa] from strains (engineering shear) to the stored stresses, shape (s, s)."""
 
     def flow_rate(self, dim: int) -> float:
         """Fastest rate at which inelastic flow relaxes the stress in slow loading [1/s]; 0 where nothing flows."""
         return 0.0
 
+    @abstractmethod
+    def law(self, space):
+        """The `warpsph.materials.Law` in a `warpsph.materials.Space`; the same object for the same space."""
 
-@dataclass(frozen=True, kw_only=True)
-class PerzynaVonMises(Elastic):
-    """Perzyna viscoplasticity with von Mises yield: dε̄/dt = γ ⟨(q − Y)/Y⟩ᴺ, Y = max(Y0 + H ε̄, r Y0).
+    def check_continuum(self, continuum: Continuum) -> None:
+        """Refuse a body whose continuum the law does not know.
 
-    Args:
-        fluidity: γ [1/s], ≥ 0.
-        yield_size: initial size of the yield surface Y0 [Pa], > 0; a uniaxial yield stress.
-        exponent: N [-], ≥ 1.
-        hardening: H = dY/dε̄ [Pa]; negative softens.
-        residual_ratio: r [-], in (0, 1]: softening ends at Y = r Y0 (the paper lets Y reach zero).
+        Raises:
+            SceneError: it does not.
+        """
+        if continuum.name not in self.continua:
+            allowed = f"its law knows {', '.join(self.continua)} only, and this body is a {continuum.name}"
+            raise SceneError("material", self, allowed)
 
-    Raises:
-        SceneError: a parameter is not allowed.
+    def initial_internals(self, points: np.ndarray) -> np.ndarray:
+        """Initial values of the internal variables, shape (n, m), at initial positions (n, d) [m].
 
-    Source: Blanc and Pastor (2012), with the flow along ∂q/∂σ; docs/method.md, section 1.
-
-    >>> soil = PerzynaVonMises(young_modulus=8e7, density=2000.0, fluidity=1.0, yield_size=2e5)
-    >>> soil.flow_rate(dim=1)  # E γ N/Y0 in a bar
-    400.0
-    """
-
-    fluidity: float
-    yield_size: float
-    exponent: float = 1.0
-    hardening: float = 0.0
-    residual_ratio: float = 0.1
-
-    def __post_init__(self):
-        super().__post_init__()
-        self._check("fluidity", at_least=0.0)
-        self._check("yield_size", above=0.0)
-        self._check("exponent", at_least=1.0)
-        self._check("hardening", above=-self.young_modulus)
-        self._check("residual_ratio", above=0.0, at_most=1.0)
-
-    def flow_rate(self, dim: int) -> float:
-        """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""
-        smallest_yield_size = self.yield_size * (self.residual_ratio if self.hardening < 0.0 else 1.0)
-        return self.relaxation_modulus(dim) * self.fluidity * self.exponent / smallest_yield_size
+        Raises:
+            SceneError: one is no finite number, or not one value a node.
+        """
+        columns = []
+        for variable in self.internals:
+            initial = variable.initial
+            at = partial(initial, self) if callable(initial) else lambda *x, value=initial: value
+            columns.append(field_of_position(variable.name, at, points, 1))
+        return np.concatenate([np.empty((len(points), 0)), *columns], axis=1)

@@ -7,35 +7,13 @@ from dataclasses import dataclass
 from ..errors import SceneError
 from ..mesh.continuum import Continuum
 from ..validate import choice, number
+from .registry import KERNELS
+from .scheme import Scheme, scheme_of
+from .smoothing import SmoothingKernel
 
-
-@dataclass(frozen=True)
-class SmoothingChoice:
-    """A smoothing function W(r/h) as far as a scene must know it.
-
-    Attributes:
-        support: radius of the support in smoothing lengths.
-        smoothing_ratio: default h/Δx.
-    """
-
-    support: float
-    smoothing_ratio: float
-
-
-# The defaults reach 1.8 Δx, a little beyond the 1.58 Δx (1.66 in 3D) that a corner node needs.
-KERNELS = {
-    "gaussian": SmoothingChoice(support=3.0, smoothing_ratio=0.6),
-    "cubic_spline": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
-    "wendland_c2": SmoothingChoice(support=2.0, smoothing_ratio=0.9),
-}
-VELOCITY_SCHEMES = ("compatible", "blanc-pastor", "taylor")
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
-LARGEST_SUPPORT = 6.0
-# With `compatible`, but in a bar: from the third ring of auxiliary nodes on (√6.5 Δx) gradients at nodes and cells
-# are no longer each other's transpose at an edge, and waves there grow.
-LARGEST_COMPATIBLE_SUPPORT = 2.55
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +21,13 @@ class Numerics:
     """Choices of the discretisation.
 
     Args:
-        kernel: smoothing function: gaussian (the paper's), cubic_spline or wendland_c2.
+        kernel: smoothing kernel: gaussian (the paper's), cubic_spline, wendland_c2 or one that was registered.
         smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given. With
             `compatible` keep the support below 2.12 Δx, and it must be at most 2.55 Δx: see
             docs/velocity_steps.md, "What still fails".
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
-        velocity_scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md), `blanc-pastor` (the
-            published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
+        velocity_scheme: the name of a scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md),
+            `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
     """
@@ -63,28 +41,28 @@ class Numerics:
 
     def __post_init__(self):
         choice("kernel", self.kernel, KERNELS)
-        choice("velocity_scheme", self.velocity_scheme, VELOCITY_SCHEMES)
+        scheme_of(self.velocity_scheme)
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
-        ratio = KERNELS[self.kernel].smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
+        ratio = self.smoothing.smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
         object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
         if self.time_step is not None:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
 
     @property
-    def unloads(self) -> bool:
-        """Whether free edges lose their tractions by elastic unloading, not by cutting them off."""
-        return self.velocity_scheme == "compatible"
+    def smoothing(self) -> SmoothingKernel:
+        """The smoothing kernel that `kernel` names."""
+        return KERNELS[self.kernel]
 
     @property
-    def follows_cells(self) -> bool:
-        """Whether kernels are stretched and turned with the cells, and so reach a stretched cell's corners."""
-        return self.velocity_scheme == "compatible"
+    def scheme(self) -> Scheme:
+        """The scheme that `velocity_scheme` names."""
+        return scheme_of(self.velocity_scheme)
 
     @property
     def support(self) -> float:
         """Radius of the support over spacing [-]."""
-        return KERNELS[self.kernel].support * self.smoothing_ratio
+        return self.smoothing.support * self.smoothing_ratio
 
     def check_support(self, continuum: Continuum, stretch: float = 1.0) -> None:
         """Refuse a support that is too small (or absurdly large) for the lattice.
@@ -93,10 +71,9 @@ class Numerics:
             continuum: the continuum, for its number of dimensions.
             stretch: longest cell edge over spacing, 1 on a regular lattice.
         """
-        support = KERNELS[self.kernel].support
+        support = self.smoothing.support
         least = continuum.smallest_support * stretch / support
-        compatible = self.velocity_scheme == "compatible" and continuum.dim > 1
-        most = (LARGEST_COMPATIBLE_SUPPORT if compatible else LARGEST_SUPPORT) / support
+        most = self.scheme.largest_support(continuum.dim) / support
         if not least < self.smoothing_ratio <= most:
             reach = continuum.smallest_support * stretch
             raise SceneError(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import SimpleNamespace
 
 from ..errors import SceneError, one_of
 from ..validate import instance, number
-from .numerics import KERNELS, SOURCE_SCHEMES, VELOCITY_SCHEMES, Numerics
+from .material import Material
+from .numerics import SOURCE_SCHEMES, Numerics
+from .registry import KERNELS
+from .scheme import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,28 @@ class Parameter:
             instance(f"Parameter.{field}", getattr(self, field), str, "a text")
         instance(self.name, self.default, float | int | str | None, "a number, True or False, a text or None")
 
+    @classmethod
+    def of(cls, material: Material, *names: str) -> tuple[Parameter, ...]:
+        """The parameters of a material, its values the defaults; `material.with_parameters(p)` is the way back.
+
+        Args:
+            material: an example of it.
+            names: which, and in which order; all unless given.
+
+        >>> from warpsph import Elastic
+        >>> clay = Elastic(young_modulus=1e6, poisson_ratio=0.4, density=1800.0)
+        >>> Parameter.of(clay, "density")[0].unit, clay.with_parameters(SimpleNamespace(density=1900.0)).density
+        ('kg/m³', 1900.0)
+        """
+        known = {entry.name: entry.metadata for entry in fields(material) if "unit" in entry.metadata}
+        for name in names:
+            if name not in known:
+                raise SceneError("Parameter.of", name, one_of(known, name))
+        return tuple(
+            cls(name, getattr(material, name), known[name]["unit"], known[name]["meaning"])
+            for name in names or known
+        )
+
     def parse(self, text: object) -> float | int | bool | str | None:
         """The value a command line gives."""
         value, automatic = str(text).strip(), self.automatic or self.default is None
@@ -66,8 +91,8 @@ def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...
         "velocity_scheme": (
             Numerics.velocity_scheme,
             "-",
-            f"velocity step: {', '.join(VELOCITY_SCHEMES)}",
-            VELOCITY_SCHEMES,
+            f"velocity step: {', '.join(SCHEMES)}",
+            tuple(SCHEMES),
         ),
         "source_scheme": (
             Numerics.source_scheme,

@@ -23,7 +23,7 @@ from ..validate import (
 from .code import identity
 from .condition import Condition, Free
 from .free_surface import FreeSurface
-from .material import Elastic
+from .material import Material
 from .numerics import Numerics
 from .output import Output
 from .resolve import BoundaryTable, resolve
@@ -61,7 +61,7 @@ class Scene:
 
     Args:
         shape: the body with its lattice.
-        material: `Elastic` or `PerzynaVonMises`.
+        material: what it is made of, such as `Elastic` (`warpsph.materials`).
         duration: simulated time [s].
         conditions: boundary conditions; an edge without one is free of traction (with a published velocity
             scheme it keeps whatever traction it has).
@@ -93,7 +93,7 @@ class Scene:
     """
 
     shape: Shape
-    material: Elastic
+    material: Material
     duration: float
     conditions: tuple[Condition, ...] = ()
     free_surface: FreeSurface | None = None
@@ -108,7 +108,7 @@ class Scene:
 
     def __post_init__(self):
         instance("shape", self.shape, Shape, "a shape such as Box(size=(1, 1), spacing=0.1)")
-        instance("material", self.material, Elastic, "a material such as Elastic(…)")
+        instance("material", self.material, Material, "a material such as Elastic(…)")
         instance("numerics", self.numerics, Numerics, "Numerics(…)")
         instance("output", self.output, Output, "Output(…)")
         instance("name", self.name, str, "a string")
@@ -120,15 +120,17 @@ class Scene:
         )
         for index, condition in enumerate(self.conditions):
             instance(f"conditions[{index}]", condition, Condition, "a condition such as Fixed(edge('left'))")
+        self.material.check_continuum(self.mesh.continuum)
         dim = self.mesh.dim
         if self.body_force is not None:
             instance("body_force", self.body_force, BodyForce, "BodyForce(…) or None")
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
         if self.free_surface is not None:
             self._check_free_surface()
-        stretch = self.mesh.largest_edge() / self.mesh.spacing
-        self.numerics.check_support(self.mesh.continuum, 1.0 if self.numerics.follows_cells else stretch)
-        _ = self.boundary, self.initial_velocity, self.initial_stress
+        scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
+        scheme.check_cells(self.mesh)
+        self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
+        _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
@@ -150,7 +152,7 @@ class Scene:
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
-        if not self.numerics.unloads:
+        if not self.numerics.scheme.unloads:
             return resolve(self.mesh, self.conditions)
         conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
         if self.free_surface is None and bare.faces(self.mesh).any():
@@ -171,6 +173,11 @@ class Scene:
     def probe_identities(self) -> dict[str, str]:
         """What each probe computes, by its name, as it was when this was asked first: functions may keep notes."""
         return {probe.name: identity(probe.function) for probe in self.output.probes}
+
+    @cached_property
+    def initial_internals(self) -> np.ndarray:
+        """The material's internal variables, in its order, shape (n, m)."""
+        return self.material.initial_internals(self.mesh.nodes)
 
     def _initial(self, name: str, function: Callable | None, size: int) -> np.ndarray:
         if function is None:

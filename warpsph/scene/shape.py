@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from ..mesh.lattice import grid_lattice
+from ..mesh import outline
+from ..mesh.lattice import grid_lattice, hinges, parts
 from ..mesh.mesh import Mesh
 from ..validate import field_of_position, instance, number, vector
 
@@ -90,9 +91,10 @@ class Box(Shape):
 
 @dataclass(frozen=True)
 class Disc(Shape):
-    """A disc cut out of a square lattice: the cells whose centre lies inside the circle.
+    """A disc cut out of a square lattice: the cells whose middle lies inside the circle, not on it.
 
-    Its edge is a staircase. For edge nodes on a curve, map a box (see `Shape.mapped`).
+    Its edge is a staircase. For edge nodes on a curve, map a box (see `Shape.mapped`). The lattice stands in the
+    disc's middle.
 
     Args:
         radius: radius [m].
@@ -114,26 +116,30 @@ class Disc(Shape):
         _limit_cells((2 * self.radius,) * 2, self.spacing)
 
     def mesh(self) -> Mesh:
-        centre = np.array(self.centre)
-        half = 0.5 * self.spacing * math.ceil(2.0 * self.radius / self.spacing - 1e-9)  # centres the lattice
+        centre, reach = np.array(self.centre), self.radius - SLACK * self.spacing
+        cells = np.full(2, math.ceil(2.0 * self.radius / self.spacing - SLACK))
         return _cut(
-            lambda p: np.sum((p - centre) ** 2, axis=-1) < self.radius**2,
-            centre - half,
-            centre + half,
+            lambda p: np.hypot(*np.moveaxis(p - centre, -1, 0)) < reach,
+            centre - 0.5 * self.spacing * cells,
+            cells,
             self.spacing,
+            math.pi * self.radius**2,
         )
 
 
 @dataclass(frozen=True)
 class Polygon(Shape):
-    """A polygon cut out of a square lattice that starts at its lowest corner: cells whose centre is inside.
+    """A polygon cut out of a square lattice: the cells whose middle lies inside it, not on its outline.
+
+    Sides along the axes lie on lattice lines, other sides become staircases. Along an axis that no side stands
+    across, the lattice is in the polygon's middle. A mirrored polygon gives the mirrored body.
 
     Args:
-        vertices: corners in order [m], three or more (x, y) pairs.
-        spacing: Δx [m].
+        vertices: corners in order, either way round [m]: three or more (x, y) pairs.
+        spacing: Δx [m]; sides along the axes lie whole numbers of spacings apart.
 
-    >>> Polygon([(0, 0), (2, 0), (0, 2)], spacing=1.0).mesh().cells.shape
-    (1, 4)
+    >>> Polygon([(0, 0), (2, 0), (0, 2)], spacing=0.25).mesh().cells.shape
+    (28, 4)
     """
 
     vertices: tuple[tuple[float, float], ...]
@@ -150,10 +156,56 @@ class Polygon(Shape):
         object.__setattr__(self, "spacing", number("spacing", self.spacing, above=0.0))
         corners = np.array(vertices)
         _limit_cells(corners.max(axis=0) - corners.min(axis=0), self.spacing)
+        for vertex, following in zip(vertices, (*vertices[1:], vertices[0]), strict=True):
+            if vertex == following:
+                raise SceneError("vertices", self.vertices, f"neighbours must differ, and {vertex} stands twice")
+        meeting = outline.meeting_sides(corners)
+        if meeting:
+            first, second = (f"{vertices[k]} to {vertices[(k + 1) % len(vertices)]}" for k in meeting)
+            allowed = (
+                f"its sides may meet in the corner they share only; those from {first} and from {second} do more"
+            )
+            raise SceneError("vertices", self.vertices, allowed)
+        for axis in (0, 1):
+            _grid_line(corners[:, axis], "xy"[axis], self.spacing)
 
     def mesh(self) -> Mesh:
         corners = np.array(self.vertices)
-        return _cut(lambda p: _inside_polygon(p, corners), corners.min(axis=0), corners.max(axis=0), self.spacing)
+        low, cells = zip(*(_grid_line(corners[:, axis], "xy"[axis], self.spacing) for axis in (0, 1)), strict=True)
+        return _cut(
+            lambda p: outline.inside(p, corners, SLACK * self.spacing),
+            np.array(low),
+            np.array(cells),
+            self.spacing,
+            outline.area(corners),
+        )
+
+
+def _grid_line(places: np.ndarray, axis: str, spacing: float) -> tuple[float, int]:
+    """Where the lattice of a polygon begins along an axis [m], and its number of cells there.
+
+    Args:
+        places: coordinate of each corner along the axis [m].
+        axis: its name.
+        spacing: Δx [m].
+    """
+    walls = np.unique(places[np.abs(places - np.roll(places, -1)) <= SLACK * spacing])
+    low, high = places.min(), places.max()
+    if not len(walls):
+        cells = math.ceil((high - low) / spacing - SLACK)
+        over = cells * spacing - (high - low)
+        return low - 0.5 * over if over > SLACK * spacing else low, cells
+    for wall in walls[1:]:
+        apart = wall - walls[0]
+        cells = round(apart / spacing)
+        if abs(apart / spacing - cells) > SLACK * max(1, cells):
+            allowed = (
+                f"the sides at {axis} = {walls[0]:g} and {wall:g} m must be a whole number of spacings apart, "
+                f"for example {apart / max(1, cells):.6g}"
+            )
+            raise SceneError("spacing", spacing, allowed)
+    below, above = (math.ceil(length / spacing - SLACK) for length in (walls[0] - low, high - walls[0]))
+    return walls[0] - below * spacing if below else walls[0], below + above
 
 
 @dataclass(frozen=True)
@@ -206,6 +258,8 @@ def _unfolded(mesh: Mesh, field: str, value: object) -> Mesh:
 
 
 LARGEST_LATTICE = 10**9
+SLACK = 1e-6  # spacings: nearer to a line than this is on it
+LARGEST_AREA_ERROR = 0.2  # of a shape cut out of a lattice, which then has too few cells to look like it
 
 
 def _limit_cells(size, spacing: float) -> None:
@@ -216,21 +270,29 @@ def _limit_cells(size, spacing: float) -> None:
         )
 
 
-def _cut(inside: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, spacing: float) -> Mesh:
-    """Lattice of the cells of a grid over the box (low, high) whose centres are inside."""
-    cells = np.maximum(1, np.ceil((high - low) / spacing - 1e-9).astype(int))
-    axes = [low[k] + spacing * (np.arange(cells[k]) + 0.5) for k in range(len(low))]
-    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    return grid_lattice(inside(centres), spacing, low, spacing * cells)
+def _cut(
+    inside: Callable[[np.ndarray], np.ndarray], low: np.ndarray, cells: np.ndarray, spacing: float, area: float
+) -> Mesh:
+    """Mesh of the cells of a plane grid whose middles are inside a figure.
 
-
-def _inside_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Even-odd rule: a point is inside when a ray in +x crosses the outline an odd number of times."""
-    x, y = points[..., 0], points[..., 1]
-    inside = np.zeros(x.shape, dtype=bool)
-    for (x0, y0), (x1, y1) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if y0 == y1:
-            continue
-        crosses = (y0 > y) != (y1 > y)
-        inside ^= crosses & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
-    return inside
+    Args:
+        inside: which of some points (…, 2) are inside.
+        low: low corner of the grid [m].
+        cells: number of cells along each axis.
+        spacing: Δx [m].
+        area: of the figure [m²].
+    """
+    axes = [start + spacing * (np.arange(count) + 0.5) for start, count in zip(low, cells, strict=True)]
+    kept = inside(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+    covered = spacing**2 * np.count_nonzero(kept)
+    if abs(covered - area) > LARGEST_AREA_ERROR * area:
+        allowed = f"it must be finer: the cells have {covered:.4g} m² in all, the shape {area:.4g} m²"
+        raise SceneError("spacing", spacing, allowed)
+    for x, y in low + spacing * hinges(kept):
+        allowed = (
+            f"near ({x:.4g}, {y:.4g}) the shape is so thin or sharp that two cells share a corner and no side"
+        )
+        raise SceneError("spacing", spacing, allowed)
+    if parts(kept) > 1:
+        raise SceneError("spacing", spacing, "it must be finer: the shape is so thin that its cells fall apart")
+    return grid_lattice(kept, spacing, low, spacing * cells)

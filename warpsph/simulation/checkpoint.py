@@ -20,7 +20,7 @@ from ..storage.files import write_whole
 from ..storage.reading import check_array, digest, read_arrays, reading, require
 from .history import History
 from .simulation import COUNTERS, Simulation
-from .time_step import Leg
+from .time_step import Stretch
 
 CHECKPOINT = "checkpoint.npz"
 STATE, HISTORY = "state/", "history/"
@@ -122,11 +122,12 @@ def _check_header(header: Mapping) -> None:
     require(all(isinstance(value, int | float) and value >= 0 for value in numbers), "its numbers are not ours")
     require(isinstance(values["steps"], int) and math.isfinite(values["time"]), "its numbers are not ours")
     require(isinstance(values["stepper"], dict), "its numbers are not ours")
-    leg = values["leg"]
-    if leg is not None:
-        require(sorted(leg) == sorted(Leg.__dataclass_fields__), "its steps are not ours")
-        require(isinstance(leg["steps"], int) and leg["steps"] > 0 and isinstance(leg["first"], int), "its steps")
-        require(all(math.isfinite(leg[name]) for name in ("start", "end")), "its steps are not ours")
+    stretch = values["stretch"]
+    if stretch is not None:
+        require(sorted(stretch) == sorted(Stretch.__dataclass_fields__), "its steps are not ours")
+        counts = stretch["steps"], stretch["first"]
+        require(all(isinstance(count, int) for count in counts) and counts[0] > 0, "its steps are not ours")
+        require(all(math.isfinite(stretch[name]) for name in ("start", "end")), "its steps are not ours")
 
 
 def write_checkpoint(

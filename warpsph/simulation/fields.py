@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..device.precision import PRECISIONS
-from ..materials import law
+from ..analysis.tensors import green_strain, mean_stress, von_mises
+from ..errors import SceneError
 from ..mesh.continuum import Continuum
-from ..mesh.mesh import Mesh
-from ..physics.space import Space
-from ..scene.material import PerzynaVonMises
 from ..scene.scene import Scene
 
 
@@ -35,10 +32,6 @@ class Field:
     available: Callable[[object], bool] = lambda scene: True
 
 
-def _has_yield(scene) -> bool:
-    return isinstance(scene.material, PerzynaVonMises)
-
-
 def _has_free_surface(scene) -> bool:
     return scene.free_surface is not None
 
@@ -49,46 +42,6 @@ def _phi(simulation) -> np.ndarray:
 
 def _stress(simulation) -> np.ndarray:
     return _phi(simulation)[:, simulation.mesh.dim :].copy()
-
-
-def _yield_size(simulation) -> np.ndarray:
-    material, eps = simulation.scene.material, simulation.internals.numpy()[:, 0]
-    return np.maximum(
-        material.yield_size + material.hardening * eps, material.residual_ratio * material.yield_size
-    )
-
-
-def von_mises(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    """q = √(3 J₂) [Pa] of stored stresses (n, s); |σ| in a bar."""
-    mean, squares = mean_stress(stress, continuum), 0.0
-    for k, (i, j) in enumerate(continuum.pairs):
-        squares = squares + ((stress[:, k] - mean) ** 2 if i == j else 2.0 * stress[:, k] ** 2)
-    stressless = 3 - sum(i == j for i, j in continuum.pairs)  # directions, of a bar
-    return np.sqrt(1.5 * (squares + stressless * mean**2))
-
-
-def mean_stress(stress: np.ndarray, continuum: Continuum) -> np.ndarray:
-    """tr σ/3 [Pa], tension positive; σ/3 in a bar."""
-    return sum(stress[:, k] for k, (i, j) in enumerate(continuum.pairs) if i == j) / 3.0
-
-
-def green_strain(mesh: Mesh, displacement: np.ndarray) -> np.ndarray:
-    """Green-Lagrange strain E = (H + Hᵀ + HᵀH)/2, H = ∂u/∂X, shape (n, s): the mean over a node's cells.
-
-    In the components and the order of the stored stresses; E33 of plane strain is zero.
-
-    Args:
-        lattice: the initial lattice.
-        displacement: of the nodes [m], shape (n, d).
-    """
-    H = mesh.cell_gradients(displacement)
-
-    def part(i: int, j: int) -> np.ndarray:
-        if max(i, j) >= mesh.dim:
-            return np.zeros(len(H))
-        return 0.5 * (H[:, i, j] + H[:, j, i] + sum(H[:, k, i] * H[:, k, j] for k in range(mesh.dim)))
-
-    return mesh.at_nodes(np.stack([part(i, j) for i, j in mesh.continuum.pairs], axis=1))
 
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
@@ -116,7 +69,6 @@ FIELDS: dict[str, Field] = {
         "Green-Lagrange strain, components as of the stress",
         lambda s: green_strain(s.mesh, s.nodes.displacement.numpy()),
     ),
-    "yield_size": Field("Pa", "(n,)", "size of the yield surface Y", _yield_size, _has_yield),
     "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
     "smoothing_length": Field(
         "m", "(n,)", "smoothing length h", lambda s: s.nodes.smoothing_length.numpy().copy()
@@ -148,14 +100,41 @@ FIELDS: dict[str, Field] = {
 
 
 def fields_of(scene: Scene) -> dict[str, Field]:
-    """The fields of a scene by name: those of `FIELDS` it has, and the internal variables of its material."""
-    return {name: field for name, field in FIELDS.items() if field.available(scene)} | internal_variables(scene)
+    """The fields of a scene by name: those of `FIELDS` it has, and those of its material.
+
+    Raises:
+        SceneError: the material calls one of its own as another one is called.
+    """
+    own = internal_variables(scene) | derived_fields(scene)
+    names = [field.name for field in (*scene.material.internals, *scene.material.derived)]
+    for name in names:
+        if name in FIELDS or names.count(name) > 1:
+            raise SceneError(f"{type(scene.material).__name__} field", name, "another field has this name")
+    return {name: field for name, field in FIELDS.items() if field.available(scene)} | own
 
 
 def internal_variables(scene: Scene) -> dict[str, Field]:
     """What the nodes of a scene remember of their material, by name."""
-    variables = law(scene.material, Space(scene.mesh.continuum, PRECISIONS["float64"])).internals
     return {
-        name: Field(unit, "(n,)", meaning, lambda s, k=k: s.internals.numpy()[:, k].copy())
-        for k, (name, unit, meaning) in enumerate(variables)
+        variable.name: Field(variable.unit, "(n,)", variable.meaning, lambda s, k=k: _internals(s)[:, k].copy())
+        for k, variable in enumerate(scene.material.internals)
     }
+
+
+def derived_fields(scene: Scene) -> dict[str, Field]:
+    """What follows from the stresses and internal variables of a scene's material, by name."""
+    return {
+        field.name: Field(
+            field.unit,
+            "(n,)",
+            field.meaning,
+            lambda s, values=field.values: values(_stress(s), _internals(s), s.scene.material),
+        )
+        for field in scene.material.derived
+    }
+
+
+def _internals(simulation) -> np.ndarray:
+    if simulation.internals is None:
+        return np.empty((len(simulation.mesh.nodes), 0))
+    return simulation.internals.numpy()

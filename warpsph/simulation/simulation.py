@@ -22,11 +22,9 @@ from .device import choose_device, choose_threads
 from .fields import fields_of
 from .interrupts import held_back
 from .state import arrays, numbers, restore
-from .time_step import ROUNDING, Leg, divide, time_step_limit
+from .time_step import Stretch, TimeStep
 
 COUNTERS = ("time", "steps", "wall_time", "shortest_step", "longest_step")
-# A step that has become too long is shortened by a little more than it must be, so that it is not done every time.
-HEADROOM = 0.95
 # Node-steps that the device makes on its own: about 0.1 s on a CPU core, 1 s on a GPU. Signals wait as long.
 AHEAD_ON_CPU, AHEAD_ON_GPU = 200_000, 1_000_000_000
 
@@ -54,7 +52,7 @@ class Simulation:
 
     Attributes:
         scene: the scene.
-        lattice: its initial lattice.
+        mesh: its initial nodes, cells and boundary faces.
         time: simulated time [s].
         steps: number of steps made.
         shortest_step, longest_step: smallest and largest Δt used so far [s].
@@ -62,6 +60,7 @@ class Simulation:
         threads: number of CPU threads.
         nodes, auxiliary, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
+        stepper: makes the steps; for developers, its parts may change from version to version.
 
     Raises:
         SceneError: the device, the precision or the time step is not allowed.
@@ -78,20 +77,20 @@ class Simulation:
         self.precision = precision_of(precision)
         self.device = choose_device(device)
         self.mesh = scene.mesh
-        self._initial_limit = time_step_limit(scene)
+        self._time_step = TimeStep(scene, lambda: self.stepper.lists.shrinkage)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        self._stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
-        self.nodes, self.auxiliary = self._stepper.nodes, self._stepper.auxiliary
-        self.internals, self.conditions = self._stepper.internals, self._stepper.conditions
+        self.stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
+        body = self.stepper.body
+        self.nodes, self.auxiliary, self.internals = body.nodes, body.auxiliary, body.internals
+        self.conditions = self.stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
-        self._leg: Leg | None = None
 
     @property
     def time_step_limit(self) -> float:
         """Largest Δt the scene now allows [s]: less than at the start where nodes are closer, or waves faster."""
-        return self._initial_limit * self._stepper.shrinkage
+        return self._time_step.limit
 
     def step(self, time_step: float | None = None) -> None:
         """Advance by one time step.
@@ -124,32 +123,26 @@ class Simulation:
         observers = tuple(observers)
         if end == self.time:
             return
-        leg = self._leg
-        if leg is None or leg.end != end or leg.time_after(self.steps) != self.time:
-            leg = self._leg = self._leg_to(end, self.time_step_limit)
-        while self.steps < leg.first + leg.steps:
+        stretch = self._time_step.begin(self.time, end, self.steps)
+        while self.steps < stretch.last:
             with held_back():
-                self._advance(self._starts(leg, observers), leg.time_step)
-                self.time = leg.time_after(self.steps)
-                if leg.time_step > self.time_step_limit * (1.0 + ROUNDING) and self.time < end:
-                    leg = self._leg = self._leg_to(end, HEADROOM * self.time_step_limit)
+                self._advance(self._starts(stretch, observers), stretch.time_step)
+                self.time = stretch.time_after(self.steps)
+                stretch = self._time_step.keep_below_limit(self.time, self.steps)
             for observer in observers:
                 observer.observe(self)
 
-    def _leg_to(self, end: float, limit: float) -> Leg:
-        return Leg(self.time, end, divide(end - self.time, limit)[0], self.steps)
-
-    def _starts(self, leg: Leg, observers: tuple[Observer, ...]) -> list[float]:
+    def _starts(self, stretch: Stretch, observers: tuple[Observer, ...]) -> list[float]:
         """Where the next steps begin [s], up to the one after which an observer looks."""
         due = min((getattr(observer, "next_time", -math.inf) for observer in observers), default=math.inf)
         ahead = AHEAD_ON_CPU if self.device.is_cpu else AHEAD_ON_GPU
-        most = max(1, min(LONGEST_RUN, ahead // len(self.mesh.nodes), leg.first + leg.steps - self.steps))
-        times = [leg.time_after(self.steps + k) for k in range(most + 1)]
+        most = max(1, min(LONGEST_RUN, ahead // len(self.mesh.nodes), stretch.last - self.steps))
+        times = [stretch.time_after(self.steps + k) for k in range(most + 1)]
         return times[: next((k for k in range(1, most) if times[k] >= due), most)]
 
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        outcome = self._stepper.advance(times, dt)
+        outcome = self.stepper.advance(times, dt, self._time_step.courant(dt))
         self.steps += outcome.made
         self.time = times[outcome.made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)
@@ -166,8 +159,9 @@ class Simulation:
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:
         """All that the next steps depend on: arrays and numbers by name; see `restore`."""
         own = {name: getattr(self, name) for name in COUNTERS}
-        leg = None if self._leg is None else asdict(self._leg)
-        return arrays(self._stepper), {**own, "leg": leg, "stepper": numbers(self._stepper)}
+        stretch = self._time_step.stretch
+        counted = {**own, "stretch": None if stretch is None else asdict(stretch)}
+        return arrays(self.stepper), counted | {"stepper": numbers(self.stepper)}
 
     def restore(self, state: Mapping[str, np.ndarray], values: Mapping[str, object]) -> None:
         """Go back to what `state` gave, in this simulation or in another one of the same scene and precision.
@@ -175,10 +169,10 @@ class Simulation:
         Raises:
             KeyError: the state is of another scene.
         """
-        restore(self._stepper, state, values["stepper"])
+        restore(self.stepper, state, values["stepper"])
         for name in COUNTERS:
             setattr(self, name, values[name])
-        self._leg = None if values["leg"] is None else Leg(**values["leg"])
+        self._time_step.stretch = None if values["stretch"] is None else Stretch(**values["stretch"])
 
     def field(self, name: str) -> np.ndarray:
         """A copy of a node field as a NumPy array; see `fields` for the names.
@@ -205,4 +199,4 @@ class Simulation:
     @property
     def list_builds(self) -> int:
         """How often the pair lists were built."""
-        return self._stepper.list_builds
+        return self.stepper.lists.builds

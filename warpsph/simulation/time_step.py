@@ -1,34 +1,104 @@
-"""The time step of a scene: from the Courant number and the stiffness of the sources."""
+"""The time step: all that is decided about Δt, from the Courant number, the sources and the deforming body."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..device.precision import PRECISIONS
 from ..errors import SceneError
 from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
-from ..physics.smoothing import SMOOTHING_FUNCTIONS, second_moment
-from ..scene.numerics import KERNELS
+from ..physics.smoothing import second_moment
 from ..scene.scene import Scene
 
 ROUNDING = 1e-9
-# On an endless lattice the compatible scheme is stable up to 1. Where sums lack neighbours on one side it is up to
-# 0.96, in a free square of 3 × 3 cells with ν = 0.499 up to 0.94; small boxes grow by up to 1.4 % a step at 1.
-EDGE_LIMIT = 0.9
+# A step that has become too long is shortened by a little more than it must be, so that it is not done every time.
+HEADROOM = 0.95
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of time covered in equal steps.
+
+    Attributes:
+        start, end: simulated times [s].
+        steps: how many.
+        first: number of steps made before it.
+    """
+
+    start: float
+    end: float
+    steps: int
+    first: int
+
+    @property
+    def time_step(self) -> float:
+        """Δt [s]."""
+        return (self.end - self.start) / self.steps
+
+    @property
+    def last(self) -> int:
+        """Number of steps made when it is covered."""
+        return self.first + self.steps
+
+    def time_after(self, steps: int) -> float | None:
+        """Simulated time [s] after so many steps since the run began; None when they lead out of the stretch."""
+        made = steps - self.first
+        return self.start + (self.end - self.start) * (made / self.steps) if 0 <= made <= self.steps else None
+
+
+class TimeStep:
+    """Decides how long the steps of a scene are.
+
+    Args:
+        scene: the scene.
+        shrinkage: tells the least present time of a wave from node to node over the initial one, at most 1.
+
+    Attributes:
+        stretch: the equal steps that are under way, or None.
+
+    Raises:
+        SceneError: the Courant number, or the given time step, is beyond the limit of the waves.
+    """
+
+    def __init__(self, scene: Scene, shrinkage: Callable[[], float]):
+        self._initial_limit, self._shrinkage = time_step_limit(scene), shrinkage
+        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.mesh.smallest_edge()  # [1/s]
+        self.stretch: Stretch | None = None
+
+    @property
+    def limit(self) -> float:
+        """Largest Δt that is allowed now [s]: less than at the start where nodes are closer, or waves faster."""
+        return self._initial_limit * self._shrinkage()
+
+    def courant(self, dt: float) -> float:
+        """c_p Δt/Δx of a step, with the least present spacing [-]."""
+        return dt * self._per_spacing / self._shrinkage()
+
+    def begin(self, time: float, end: float, steps: int) -> Stretch:
+        """The equal steps to a time [s]: those that a run stopped in, or new ones."""
+        under_way = self.stretch
+        if under_way is None or under_way.end != end or under_way.time_after(steps) != time:
+            self.stretch = self._to(time, end, steps, self.limit)
+        return self.stretch
+
+    def keep_below_limit(self, time: float, steps: int) -> Stretch:
+        """The steps under way, shortened where they have become too long."""
+        end = self.stretch.end
+        if self.stretch.time_step > self.limit * (1.0 + ROUNDING) and time < end:
+            self.stretch = self._to(time, end, steps, HEADROOM * self.limit)
+        return self.stretch
+
+    @staticmethod
+    def _to(time: float, end: float, steps: int, limit: float) -> Stretch:
+        return Stretch(time, end, divide(end - time, limit)[0], steps)
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ (METHOD section 4), for the compatible scheme 1 in a bar,
-    else `EDGE_LIMIT`."""
-    numerics, precision = scene.numerics, PRECISIONS["float64"]
-    weight = SMOOTHING_FUNCTIONS[numerics.kernel](precision)
-    support, dim = KERNELS[numerics.kernel].support, scene.mesh.dim
-    moment = second_moment(weight, precision, numerics.smoothing_ratio, support, dim)
-    limit = 2.0 * math.sqrt(moment)
-    if numerics.unloads:
-        return min(limit, 1.0 if dim == 1 else EDGE_LIMIT)
-    return limit
+    """Largest stable c_p Δt/Δx of the wave part, by the scene's scheme (METHOD section 4)."""
+    numerics, dim = scene.numerics, scene.mesh.dim
+    moment = second_moment(numerics.smoothing, ratio=numerics.smoothing_ratio, dim=dim)
+    return numerics.scheme.courant_limit(dim, moment)
 
 
 def time_step_limit(scene: Scene) -> float:
@@ -72,29 +142,3 @@ def divide(duration: float, limit: float) -> tuple[int, float]:
     """
     steps = max(1, math.ceil(duration / limit * (1.0 - ROUNDING)))
     return steps, duration / steps
-
-
-@dataclass(frozen=True)
-class Leg:
-    """A stretch of time covered in equal steps.
-
-    Attributes:
-        start, end: simulated times [s].
-        steps: how many.
-        first: number of steps made before it.
-    """
-
-    start: float
-    end: float
-    steps: int
-    first: int
-
-    @property
-    def time_step(self) -> float:
-        """Δt [s]."""
-        return (self.end - self.start) / self.steps
-
-    def time_after(self, steps: int) -> float | None:
-        """Simulated time [s] after so many steps since the run began; None when they lead out of the leg."""
-        made = steps - self.first
-        return self.start + (self.end - self.start) * (made / self.steps) if 0 <= made <= self.steps else None

@@ -18,16 +18,22 @@ from ..physics.space import Space
 
 LONGEST_RUN = 256  # steps
 HALF, END = 0, 1  # rows of `Clock.drive`
+NON_FINITE, FIRST_FLAG, MOST_FLAGS = 2, 3, 2  # where they stand in the status, and how many there may be
 STAGES = 5  # t, t + Δt/4, …, t + Δt: the classical scheme needs both ends and the middle of each half step
 
 
 class Outcome(NamedTuple):
-    """Number of steps made, and why the host is needed now."""
+    """What the steps came to.
+
+    Attributes:
+        made: how many were made.
+        non_finite: whether a value stopped being finite.
+        outdated: the number of the first flag that a kernel has raised, in the order of `Clock.new_flag`, or None.
+    """
 
     made: int
-    lists_outdated: bool
-    surface_outdated: bool
     non_finite: bool
+    outdated: int | None
 
 
 class Clock:
@@ -41,7 +47,7 @@ class Clock:
         time_step: Δt [s].
         first_half, second_half: b at the start, the middle and the end of each half step.
         drive: values of the functions, those at t + Δt/2 in row `HALF`, those at t + Δt in row `END`.
-        lists_outdated, surface_outdated, non_finite: one integer each, set by kernels.
+        non_finite: one integer, set by kernels.
         going: 1 while steps are to be made.
         kernels: the kernel of `tick`.
     """
@@ -62,29 +68,36 @@ class Clock:
         self._drive = wp.zeros(2 * columns, dtype=real, device=device)
         self.drive = self._drive.reshape((2, columns))
         self.time_step = wp.zeros(1, dtype=real, device=device)
-        self._status = wp.zeros(5, dtype=wp.int32, device=device)  # steps made, steps to make, three flags
+        # Steps made, steps to make, not finite, flags.
+        self._status = wp.zeros(FIRST_FLAG + MOST_FLAGS, dtype=wp.int32, device=device)
+        self._flags = 0
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
         self.first_half, self.second_half = self._force[:3], self._force[2:]
-        self.lists_outdated, self.surface_outdated, self.non_finite = (self._status[k : k + 1] for k in (2, 3, 4))
+        self.non_finite = self._status[NON_FINITE : NON_FINITE + 1]
         self._tick = _tick_kernel(space)
         self.kernels = (self._tick,)
+
+    def new_flag(self) -> wp.array:
+        """One integer that a kernel sets where the host must do something before the next step."""
+        self._flags += 1
+        return self._status[FIRST_FLAG + self._flags - 1 : FIRST_FLAG + self._flags]
 
     def begin(self, times: Sequence[float], dt: float) -> None:
         """Get ready for the steps from each of the times [s], at most `LONGEST_RUN`, to Δt later."""
         half = 0.5 * dt
-        put(self.time_step, (dt,))
+        write_values(self.time_step, (dt,))
         if self._body_force is not None:
             stages = [(t, t + 0.5 * half, t + half, t + half + 0.5 * half, t + half + half) for t in times]
             forces = np.array([[self._body_force(t) for t in row] for row in stages], dtype=float)
-            put(self._forces[: len(times)], forces)
-            put(self._force, forces[0])
+            write_values(self._forces[: len(times)], forces)
+            write_values(self._force, forces[0])
         if self._functions:
             ends = [(t + half, t + dt) for t in times]
             drives = np.array([[_value(f, t) for t in row for f in self._functions] for row in ends])
-            put(self._drives[: len(times)], drives)
-            put(self._drive, drives[0])
-        put(self._status[:2], (0, len(times)))
-        put(self.going, (1,))
+            write_values(self._drives[: len(times)], drives)
+            write_values(self._drive, drives[0])
+        write_values(self._status[:2], (0, len(times)))
+        write_values(self.going, (1,))
 
     def tick(self) -> None:
         """Close a step: go on to the next, or end."""
@@ -93,15 +106,15 @@ class Clock:
 
     def outcome(self) -> Outcome:
         """What the steps since `begin` came to."""
-        made, _, *flags = self._status.numpy().tolist()
-        return Outcome(made, *map(bool, flags))
+        made, _, non_finite, *flags = self._status.numpy().tolist()
+        return Outcome(made, bool(non_finite), next((k for k, raised in enumerate(flags) if raised), None))
 
 
 def _value(function, t: float) -> float:
     return function(t) if callable(function) else function
 
 
-def put(array: wp.array, values) -> None:
+def write_values(array: wp.array, values) -> None:
     """Write values into an array; on the CPU without the cost of a transfer."""
     if array.device.is_cpu:
         array.numpy()[...] = values
@@ -125,7 +138,10 @@ def _tick_kernel(space: Space):
     ):
         made = status[0] + 1
         status[0] = made
-        if made >= status[1] or status[2] + status[3] + status[4] > 0:
+        raised = wp.int32(0)
+        for k in range(NON_FINITE, status.shape[0]):
+            raised += status[k]
+        if made >= status[1] or raised > 0:
             going[0] = 0
             return
         for k in range(force.shape[0]):

@@ -4,8 +4,10 @@ import numpy as np
 import warp as wp
 
 from ..materials.law import Law
+from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..scene.scene import Scene
+from .cells import cell_table
 
 
 def material_nodes(scene: Scene, space: Space, device: wp.Device):
@@ -43,29 +45,29 @@ def material_nodes(scene: Scene, space: Space, device: wp.Device):
 def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     """h₀ [m], shape (n,): (smoothing ratio) · (V₀)^{1/d}, the ratio times the local spacing.
 
-    In the compatible scheme the ratio times the largest stretch of the node's cells, since kernels are stretched
-    with them and the pair lists must hold all that they see.
+    Where kernels follow the cells, the ratio times the largest stretch of the node's cells: lists must then hold
+    all that a stretched kernel sees.
     """
     mesh, ratio = scene.mesh, scene.numerics.smoothing_ratio
-    if not scene.numerics.follows_cells:
+    if not scene.numerics.scheme.follows_cells:
         return ratio * volume ** (1.0 / mesh.dim)
     stretch, largest = np.linalg.norm(mesh.cell_jacobians(), 2, axis=(1, 2)), np.zeros(len(volume))
     np.maximum.at(largest, mesh.cells, stretch[:, None])
     return ratio * largest
 
 
-def material_internals(n: int, law: Law, space: Space, device: wp.Device) -> wp.array | None:
-    """The internal variables of the material nodes, zero; None for a law without any."""
+def material_internals(scene: Scene, law: Law, space: Space, device: wp.Device) -> wp.array | None:
+    """The internal variables of the material nodes at the start; None for a law without any."""
     if not law.internals:
         return None
-    return wp.zeros(n, dtype=space.vec(len(law.internals)), device=device)
+    return wp.array(scene.initial_internals, dtype=space.vec(len(law.internals)), device=device)
 
 
-def auxiliary_nodes(scene: Scene, space: Space, device: wp.Device):
+def auxiliary_nodes(scene: Scene, space: Space, kind: CellKind, device: wp.Device):
     """The auxiliary nodes, as an `AuxiliaryNodes` struct, still to be centred in their cells.
 
     Its arrays, one entry a node: `point`; `volume`, `density` and `smoothing_length`, means over the cell's nodes
-    as its position is; `cell`, the indices of those nodes, shape (m, 2ᵈ).
+    as its position is; `cell`, the indices of those nodes, shape (m, c).
     """
     cells = scene.mesh.cells
     auxiliary = space.types.AuxiliaryNodes()
@@ -73,5 +75,5 @@ def auxiliary_nodes(scene: Scene, space: Space, device: wp.Device):
     auxiliary.volume = wp.zeros(len(cells), dtype=space.real, device=device)
     auxiliary.density = wp.zeros(len(cells), dtype=space.real, device=device)
     auxiliary.smoothing_length = wp.zeros(len(cells), dtype=space.real, device=device)
-    auxiliary.cell = wp.array(cells, dtype=wp.int32, device=device)
+    auxiliary.cell = cell_table(scene.mesh, kind, device)
     return auxiliary

@@ -11,11 +11,13 @@ on a GPU half as many as in the grid's order.
 """
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
+from ..device.launching import Launcher
 from ..device.precision import PRECISIONS
 from ..device.reduction import LargestMagnitude
 from ..physics.space import Space
@@ -33,6 +35,20 @@ class PairList:
     index: wp.array(dtype=wp.int32)
 
 
+class Search(NamedTuple):
+    """How far a list reaches.
+
+    Attributes:
+        support: radius of the support in smoothing lengths.
+        spacing: lattice spacing [m].
+        skin: extra search radius [m].
+    """
+
+    support: float
+    spacing: float
+    skin: float
+
+
 class Neighbours:
     """The pair list of the sources around each target.
 
@@ -40,46 +56,41 @@ class Neighbours:
         space: what the points are.
         launcher: launches the kernels that make it.
         targets, sources: node structs (material or auxiliary).
-        support: radius of the support in smoothing lengths.
-        spacing: lattice spacing [m].
-        skin: extra search radius [m].
+        search: how far it reaches.
 
     Attributes:
         pairs: the list, once built.
         kernels: the kernels that make it.
     """
 
-    def __init__(self, space, launcher, targets, sources, support, spacing, skin):
+    def __init__(self, space: Space, launcher: Launcher, *, targets, sources, search: Search):
         self.pairs = PairList()
-        self._launcher, self._targets, self._sources = launcher, targets, sources
-        self._support, self._skin, self._spacing = support, skin, spacing
+        self._launcher, self._targets, self._sources, self._search = launcher, targets, sources, search
         self._kernels = _list_kernels(space)
         device, n, m = sources.point.device, targets.point.shape[0], sources.point.shape[0]
         self._origin = np.array(sources.point.numpy()["x"].mean(axis=0), dtype=float)
         self._grid_points = wp.zeros(m, dtype=wp.vec3, device=device)
-        self._grid = wp.HashGrid(*_grid_size(sources, spacing, space.dim), device=device)
+        self._grid = wp.HashGrid(*_grid_size(sources, search.spacing, space.dim), device=device)
         self._counts = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self.pairs.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self._extent = LargestMagnitude(3 * m, PRECISIONS["float32"], launcher)
         self._largest_h = LargestMagnitude(n, space.precision, launcher)
-        self.kernels = (
-            *(self._kernels.copy_points, self._kernels.count, self._kernels.fill),
-            *(*self._extent.kernels, *self._largest_h.kernels),
-        )
+        self.kernels = (*self._kernels, *self._extent.kernels, *self._largest_h.kernels)
+        self._vector = space.types.vector
 
     def build(self) -> None:
         """Make the list anew for the present positions and smoothing lengths."""
-        kernels, device = self._kernels, self._grid_points.device
+        kernels, search, device = self._kernels, self._search, self._grid_points.device
         n = self._targets.point.shape[0]
-        origin = kernels.vector(*self._origin.tolist())
+        origin = self._vector(*self._origin.tolist())
         copied = [self._sources.point, origin, self._grid_points]
         self._launcher.launch(kernels.copy_points, self._grid_points, copied)
         # The grid works in float32: widen its queries by what rounding can do, the sweep tests exactly.
-        margin = self._skin + 1e-4 * self._spacing + 1e-6 * self._extent.of(self._grid_points)
-        radius = self._support * self._largest_h.of(self._targets.smoothing_length) + margin
+        margin = search.skin + 1e-4 * search.spacing + 1e-6 * self._extent.of(self._grid_points)
+        radius = search.support * self._largest_h.of(self._targets.smoothing_length) + margin
         self._grid.build(self._grid_points, radius)
         query = [self._grid.id, self._grid_points, self._targets.point, self._targets.smoothing_length]
-        query += [origin, self._support, margin]
+        query += [origin, search.support, margin]
         self._launcher.launch(kernels.count, self._targets.point, [*query, self._counts])
         wp.utils.array_scan(self._counts, self.pairs.start, inclusive=False)
         total = int(self.pairs.start[n : n + 1].numpy()[0])
@@ -99,22 +110,21 @@ def _grid_size(sources, spacing: float, dim: int) -> tuple[int, int, int]:
     return tuple(np.ceil(cells).astype(int).tolist() + [1] * (3 - dim))
 
 
-class _Kernels:
-    def __init__(self, vector, copy_points, count, fill):
-        self.vector, self.copy_points, self.count, self.fill = vector, copy_points, count, fill
+class _Kernels(NamedTuple):
+    copy_points: wp.Kernel
+    count: wp.Kernel
+    fill: wp.Kernel
 
 
 @cache
 def _list_kernels(space: Space) -> _Kernels:
-    types = space.types
-    Point, vector, real = types.Point, types.vector, space.real
-    dim = space.dim
+    Point, vector, real = space.types.Point, space.types.vector, space.real
 
     @wp.func
     def grid_point(x: vector, origin: vector):
         r = x - origin
         p = wp.vec3()
-        for k in range(wp.static(dim)):
+        for k in range(wp.static(space.dim)):
             p[k] = wp.float32(r[k])
         return p
 
@@ -170,4 +180,4 @@ def _list_kernels(space: Space) -> _Kernels:
                 pairs.index[k] = j
                 end += 1
 
-    return _Kernels(vector, copy_points, count, fill)
+    return _Kernels(copy_points, count, fill)

@@ -1,1 +1,3 @@
-"""The time step."""
+"""The time step; importing it makes the schemes known."""
+
+from . import scheme  # noqa: F401

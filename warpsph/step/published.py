@@ -1,87 +1,125 @@
-"""Steps 3-10 as published: Shepard values and corrected gradients from one set of nodes to the other."""
+"""Steps 3-10 as published: Shepard values and corrected gradients from one set of nodes to the other.
 
+Two velocity steps: `blanc-pastor`, which has no checkerboard but filters every wave, and `taylor`, which keeps
+waves and leaves the checkerboard alone.
+"""
+
+from collections.abc import Callable
 from functools import cache
 
 import warp as wp
 
 from ..device.compiling import forward_kernel
-from ..device.launching import Launcher
 from ..materials.law import Law
-from ..operators.conditions import ConditionTypes
-from ..operators.motion import half_step_gradient, initial_gradient
-from ..operators.neighbour_sums import Sweep, batch_on, sweep
+from ..operators.conditions import Conditions, ConditionTypes
+from ..operators.motion import Motion, half_step_gradient, initial_gradient
+from ..operators.neighbour_sums import NeighbourSums, batch_on, neighbour_sums, round_metric
 from ..physics.space import Space
 from ..physics.waves import wave_rate
-from ..scene.scene import Scene
+from ..scene.scheme import Scheme, wave_limit
+from ..state.body import Body
 from ..state.clock import HALF
 from ..state.pairs import PairList
-from .velocity_schemes import VELOCITY_SCHEMES
+
+LARGEST_SUPPORT = 6.0  # [Δx]
+
+
+@cache
+def blanc_pastor(space: Space) -> wp.Function:
+    """v_adv = 2 v^{n+1/2} − v_s: the published step 10b.
+
+    No checkerboard, but it filters every wave with diffusivity about (2 m₂ − C²/2) Δx²/Δt (METHOD section 4).
+    v_s, not vⁿ, stands on the right: with vⁿ step 12 would apply 1.5 times the body force.
+    """
+    vector, real = space.types.vector, space.real
+
+    @wp.func
+    def advance(v_s: vector, v_half: vector, acceleration: vector, dt: real):
+        return real(2.0) * v_half - v_s
+
+    return advance
+
+
+@cache
+def taylor(space: Space) -> wp.Function:
+    """v_adv = v_s − Δt div f(φ^{n+1/2}): the complete two-step Taylor scheme; leaves the checkerboard alone."""
+    vector = space.types.vector
+
+    @wp.func
+    def advance(v_s: vector, v_half: vector, acceleration: vector, dt: space.real):
+        return v_s + dt * acceleration
+
+    return advance
 
 
 class PublishedFluxes:
-    """The two sweeps of the published schemes.
+    """The two passes of a published scheme.
 
     Args:
-        scene: the scene.
-        law: its material law.
-        conditions: types of its boundary conditions.
+        advance_velocity: makes the function of step 10b.
+        body: the body.
+        conditions: its boundary conditions.
+        around_auxiliary, around_nodes: the pair lists.
 
     Attributes:
-        kernels: the kernels of the two sweeps.
+        kernels: the kernels of the two passes.
     """
 
-    def __init__(self, scene: Scene, law: Law, conditions: ConditionTypes, space: Space, launcher: Launcher):
-        self._launcher = launcher
-        numerics = scene.numerics
-        parts = sweep(space, numerics.kernel, batch_on(launcher.device))
-        self._to_auxiliary = _to_auxiliary_kernel(space, parts, law.Parameters)
+    def __init__(
+        self,
+        advance_velocity: Callable[[Space], wp.Function],
+        body: Body,
+        *,
+        conditions: Conditions,
+        around_auxiliary: PairList,
+        around_nodes: PairList,
+    ):
+        self._body, self._conditions = body, conditions
+        self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
+        space, law = body.space, body.law
+        sums = neighbour_sums(space, body.scene.numerics.smoothing, batch_on(body.launcher.device))
+        to_half_step = (half_step_gradient if body.scene.large_displacements else initial_gradient)(space)
+        self._to_auxiliary = _to_auxiliary_kernel(space, law, sums)
         self._to_nodes = _to_nodes_kernel(
-            space,
-            parts,
-            law.Parameters,
-            numerics.velocity_scheme,
-            scene.large_displacements,
-            conditions,
+            space, law, sums, advance_velocity(space), to_half_step, conditions.types
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
 
     def set_courant(self, courant: float) -> None:
         """Nothing: the published schemes know the time step only."""
 
-    def to_auxiliary(self, material, dt: wp.array, pairs: PairList, nodes, internals, auxiliary) -> None:
+    def to_auxiliary(self, dt: wp.array) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
-        inputs = [material, dt, pairs, nodes, auxiliary]
-        self._launcher.launch(self._to_auxiliary, auxiliary.point, inputs)
+        body = self._body
+        inputs = [body.parameters, dt, self._around_auxiliary, body.nodes, body.auxiliary]
+        body.launcher.launch(self._to_auxiliary, body.auxiliary.point, inputs)
 
-    def to_nodes(self, material, conditions, dt: wp.array, pairs: PairList, auxiliary, nodes) -> None:
+    def to_nodes(self, dt: wp.array) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
-        inputs = [material, conditions, dt, pairs, auxiliary, nodes]
-        self._launcher.launch(self._to_nodes, nodes.point, inputs)
+        body = self._body
+        inputs = [body.parameters, self._conditions.table, dt, self._around_nodes, body.auxiliary, body.nodes]
+        body.launcher.launch(self._to_nodes, body.nodes.point, inputs)
 
 
 @cache
-def _to_auxiliary_kernel(space: Space, parts: Sweep, Parameters: type):
-    types = space.types
-    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
-    rate = wave_rate(space, Parameters)
-    collect, value, gradient = parts.collect, parts.value, parts.gradient
-    round_metric = parts.round_metric
+def _to_auxiliary_kernel(space: Space, law: Law, sums: NeighbourSums):
+    real, metric_of, rate = space.real, round_metric(space), wave_rate(space, law.Parameters)
 
     @forward_kernel
     def to_auxiliary(
         first: int,
-        material: Parameters,
+        material: law.Parameters,
         time_step: wp.array(dtype=real),
         pairs: PairList,
-        nodes: MaterialNodes,
-        auxiliary: AuxiliaryNodes,
+        nodes: space.types.MaterialNodes,
+        auxiliary: space.types.AuxiliaryNodes,
     ):
         a = first + wp.tid()
         point = auxiliary.point[a]
-        metric = round_metric(auxiliary.smoothing_length[a])
-        sums = collect(a, point.x, metric, point.phi, pairs, nodes.point, nodes.volume)
-        phi = value(sums)  # 3
-        minus_div_f = rate(gradient(sums, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
+        metric = metric_of(auxiliary.smoothing_length[a])
+        around = sums.collect(a, point.x, metric, point.phi, pairs, nodes.point, nodes.volume)
+        phi = sums.value(around)  # 3
+        minus_div_f = rate(sums.gradient(around, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
         auxiliary.point[a].phi = phi + real(0.5) * time_step[0] * minus_div_f  # 6
 
     return to_auxiliary
@@ -90,46 +128,54 @@ def _to_auxiliary_kernel(space: Space, parts: Sweep, Parameters: type):
 @cache
 def _to_nodes_kernel(
     space: Space,
-    parts: Sweep,
-    Parameters: type,
-    scheme: str,
-    moves: bool,
+    law: Law,
+    sums: NeighbourSums,
+    advance_velocity: wp.Function,
+    to_half_step: wp.Function,
     conditions: ConditionTypes,
 ):
-    types = space.types
-    real, MaterialNodes, AuxiliaryNodes = space.real, types.MaterialNodes, types.AuxiliaryNodes
-    phi = space.phi
-    velocity, stress, join, velocity_gradient = phi.velocity, phi.stress, phi.join, phi.velocity_gradient
-    Table, apply = conditions.Table, conditions.apply
-    rate = wave_rate(space, Parameters)
-    collect, value, gradient = parts.collect, parts.value, parts.gradient
-    round_metric = parts.round_metric
-    advance_velocity = VELOCITY_SCHEMES[scheme](space)
-    to_half_step = half_step_gradient(space) if moves else initial_gradient(space)
+    phi, metric_of, rate = space.phi, round_metric(space), wave_rate(space, law.Parameters)
 
     @forward_kernel
     def to_nodes(
         first: int,
-        material: Parameters,
-        conditions: Table,
-        time_step: wp.array(dtype=real),
+        material: law.Parameters,
+        table: conditions.Table,
+        time_step: wp.array(dtype=space.real),
         pairs: PairList,
-        auxiliary: AuxiliaryNodes,
-        nodes: MaterialNodes,
+        auxiliary: space.types.AuxiliaryNodes,
+        nodes: space.types.MaterialNodes,
     ):
         i = first + wp.tid()
         dt, point = time_step[0], nodes.point[i]
-        metric = round_metric(nodes.smoothing_length[i])
-        sums = collect(i, point.x, metric, point.phi, pairs, auxiliary.point, auxiliary.volume)
-        phi_half = apply(i, value(sums), HALF, conditions)  # 7
-        grad, volume_ratio = to_half_step(gradient(sums, phi_half), dt)
+        metric = metric_of(nodes.smoothing_length[i])
+        around = sums.collect(i, point.x, metric, point.phi, pairs, auxiliary.point, auxiliary.volume)
+        phi_half = conditions.apply(i, sums.value(around), HALF, table)  # 7
+        grad, volume_ratio = to_half_step(sums.gradient(around, phi_half), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
 
-        v_half = velocity(phi_half)
-        sigma_adv = stress(point.phi) + dt * stress(minus_div_f)  # 10a
-        v_adv = advance_velocity(velocity(point.phi), v_half, velocity(minus_div_f), dt)  # 10b
-        nodes.point[i].phi = join(v_adv, sigma_adv)
+        v_half = phi.velocity(phi_half)
+        sigma_adv = phi.stress(point.phi) + dt * phi.stress(minus_div_f)  # 10a
+        v_adv = advance_velocity(phi.velocity(point.phi), v_half, phi.velocity(minus_div_f), dt)  # 10b
+        nodes.point[i].phi = phi.join(v_adv, sigma_adv)
         nodes.half_velocity[i] = v_half
-        nodes.velocity_gradient[i] = velocity_gradient(grad)
+        nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
 
     return to_nodes
+
+
+def _published(name: str, meaning: str, advance_velocity: Callable[[Space], wp.Function]) -> Scheme:
+    return Scheme(
+        name=name,
+        meaning=meaning,
+        fluxes=lambda body, **more: PublishedFluxes(advance_velocity, body, **more),
+        motion=Motion,
+        unloads=False,
+        follows_cells=False,
+        courant_limit=wave_limit,
+        largest_support=lambda dim: LARGEST_SUPPORT,
+    )
+
+
+BLANC_PASTOR = _published("blanc-pastor", "the published step, 2 v^{n+1/2} − v: filters waves", blanc_pastor)
+TAYLOR = _published("taylor", "the paper's complete scheme: leaves the checkerboard alone", taylor)

@@ -51,7 +51,7 @@ class FreeSurfaceConditions(Conditions):
         types = space.types
         super().__init__(scene.boundary, len(mesh.nodes), space, launcher, clock)
         self._unmoved = ~surface.moved(mesh, scene.boundary)
-        self._moves = scene.large_displacements
+        self._moves, self._nodes = scene.large_displacements, nodes
         self._scan = SurfaceScan(scene, surface.candidates(mesh, scene.boundary), nodes, space, launcher)
         self.types = free_surface_types(space)
         self._b = self._scan.candidates.node.shape[0]
@@ -61,15 +61,15 @@ class FreeSurfaceConditions(Conditions):
         self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
         self.table.unloading = wp.array(_unloading(scene), dtype=space.real, device=device)
         self._turned = wp.zeros(self._b, dtype=space.real, device=device)
-        self._outdated = clock.surface_outdated
+        self.outdated = clock.new_flag()
         self._kernel = apply_kernel(space, self.types)
         self._project = _project_kernel(space)
         self._turn = _turn_kernel(space)
         self.kernels = (self._kernel, self._project, self._turn, *self._scan.kernels)
 
-    def locate(self, nodes) -> None:
+    def refresh(self) -> None:
         """Find the free surface in the present configuration."""
-        self._scan.find(nodes)
+        self._scan.find(self._nodes)
         wp.launch(
             self._project,
             self._b,
@@ -77,7 +77,7 @@ class FreeSurfaceConditions(Conditions):
             device=self._turned.device,
         )
         self._turned.zero_()
-        self._outdated.zero_()
+        self.outdated.zero_()
 
     def turn(self, nodes, dt: wp.array) -> None:
         """Turn the directions freed as the stresses turn in half a time step; never at small displacements.
@@ -85,7 +85,7 @@ class FreeSurfaceConditions(Conditions):
         A normal that lags by θ leaves the shear traction σ_tt θ, which drives a spinning body round.
         """
         if self._moves:
-            inputs = [nodes, dt, self.table, self._turned, self._outdated]
+            inputs = [nodes, dt, self.table, self._turned, self.outdated]
             self._launcher.launch(self._turn, nodes.point, inputs, gathers=False)
 
     def on_surface(self) -> np.ndarray:
@@ -154,7 +154,7 @@ def free_surface_types(space: Space) -> ConditionTypes:
 def _unloading(scene: Scene) -> list[float]:
     """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
     material, dim = scene.material, scene.mesh.dim
-    if not scene.numerics.unloads:
+    if not scene.numerics.scheme.unloads:
         return [0.0] * (dim + 1)
     lame, shear = material.lame_modulus, material.shear_modulus
     return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, dim + 1))]

@@ -30,7 +30,7 @@ from ...physics.smoothing import wendland_c2
 from ...physics.space import Space
 from ...scene.resolve import SMOOTH_EDGE_ANGLE
 from ...scene.scene import Scene
-from ...state.pairs import Neighbours, PairList
+from ...state.pairs import Neighbours, PairList, Search
 
 # The scan reaches 2 h_s, just as far as the support of this W, which is steep enough to tell a surface's normal
 # apart from that of the next face: on a box it errs by 3° beside an edge, the Gaussian by 7°.
@@ -117,8 +117,8 @@ class SurfaceScan:
         self.candidates = _candidates(candidates, space, device)
         self._ratio = scene.free_surface.scan_ratio
         spacing = scene.mesh.spacing
-        search = (SCAN_SUPPORT, spacing, 0.0)
-        self._around = Neighbours(space, launcher, self.candidates, nodes, *search)
+        search = Search(support=SCAN_SUPPORT, spacing=spacing, skin=0.0)
+        self._around = Neighbours(space, launcher, targets=self.candidates, sources=nodes, search=search)
         self.pairs = self._around.pairs
         self._gather = _gather_kernel(space)
         self._scan = _scan_kernel(space)

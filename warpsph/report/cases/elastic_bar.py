@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case import Case, Picture, Row, Section
-from ..drawing import BRIGHT, DARK, GREY, Curve, diagram, new_figure, save
+from ..drawing import BRIGHT, DARK, GREY, Curve, diagram, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -15,7 +15,7 @@ BAR = Run("elastic_bar", "elastic_bar", (), tuple(np.round(np.arange(0.0, 0.0301
 
 def case(quick: bool) -> Case:
     """One run of a second; the same in the quick form."""
-    return Case("elastic_bar", (BAR,), tell)
+    return Case("elastic_bar", (BAR,), section)
 
 
 def dalembert(x, t, length, speed, velocity, impedance):
@@ -36,7 +36,7 @@ def dalembert(x, t, length, speed, velocity, impedance):
     return v, stress, u
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figures 8 to 11 and the plateaus."""
     bar = results[BAR.name]
     p, module, history = bar.parameters, bar.file.module, bar.history
@@ -56,7 +56,7 @@ def tell(results, picture) -> Section:
             Curve("exact", 1e3 * t, values, exact=True),
             Curve("warpsph", 1e3 * history["time"], scale * history[name]),
         ]
-        path = diagram(picture(number), curves, "time [ms]", label)
+        path = diagram(picture(number), curves, x_label="time [ms]", y_label=label)
         pictures.append(Picture(path, f"Fig. {number}: {name} at node 11 (x = 0.1 m)."))
     pictures.append(
         Picture(
@@ -67,10 +67,29 @@ def tell(results, picture) -> Section:
     )
     sigma = p.density * speed * p.velocity
     rows = [
-        Row("worst velocity plateau", bar.check("worst_velocity_plateau"), "m/s", 1.0, p.velocity, bar.seconds),
-        Row("worst stress plateau", bar.check("worst_stress_plateau"), "Pa", "±4e5", f"0, {sigma:.4g} or 8e5"),
-        Row("largest displacement", bar.check("largest_displacement"), "m", 0.001, 2.0 * module.POINT / speed),
-        Row("smallest displacement", bar.check("smallest_displacement"), "m", 0.0, 0.0),
+        Row(
+            "worst velocity plateau",
+            bar.check("worst_velocity_plateau"),
+            unit="m/s",
+            paper=1.0,
+            exact=p.velocity,
+            seconds=bar.seconds,
+        ),
+        Row(
+            "worst stress plateau",
+            bar.check("worst_stress_plateau"),
+            unit="Pa",
+            paper="±4e5",
+            exact=f"0, {sigma:.4g} or 8e5",
+        ),
+        Row(
+            "largest displacement",
+            bar.check("largest_displacement"),
+            unit="m",
+            paper=0.001,
+            exact=2.0 * module.POINT / speed,
+        ),
+        Row("smallest displacement", bar.check("smallest_displacement"), unit="m", paper=0.0, exact=0.0),
     ]
     return Section(
         prose=prose("elastic_bar"),
@@ -81,7 +100,7 @@ def tell(results, picture) -> Section:
 
 
 def _figure11(bar, path):
-    figure, axes = new_figure(1, 1, (7.5, 5.0))
+    figure, axes = grid(1, 1, size=(7.5, 5.0))
     at, X = axes[0, 0], bar.mesh.nodes[:, 0]
     time, u = 1e3 * bar.times, np.array([frame.field("displacement")[:, 0] for frame in bar.frames])
     drawn = X + MAGNIFIED * u
@@ -96,4 +115,4 @@ def _figure11(bar, path):
     at.axvline(1.0, color=GREY, linewidth=0.8)
     at.set_xlabel("x + 20 u [m]")
     at.set_ylabel("time [ms]")
-    return save(figure, path)
+    return save_picture(figure, path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case import Case, Picture, Row, Section
-from ..drawing import Curve, Panel, diagram, fields
+from ..drawing import Curve, Panel, diagram, draw_fields
 from ..prose import prose
 from ..runs import Run
 
@@ -16,24 +16,29 @@ MAGNIFIED = 200.0  # displacements in the figure, as in the paper
 
 def case(quick: bool) -> Case:
     """Both schemes; the same in the quick form."""
-    return Case("hanging_bar", (COMPLETE, PUBLISHED), tell)
+    return Case("hanging_bar", (COMPLETE, PUBLISHED), section)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figure 6, the checkerboard in time, and the amplitude left."""
     both = [(label, results[run.name]) for label, run in (("complete", COMPLETE), ("published", PUBLISHED))]
-    figure6 = fields(
+    figure6 = draw_fields(
         picture("6"),
         [[_panel(f"{label} scheme", result) for label, result in both]],
-        "vertical velocity [m/s]",
-        (5.2, 7.0),
+        label="vertical velocity [m/s]",
+        size=(5.2, 7.0),
     )
     time = [
         Curve(f"{label} scheme", 1e3 * result.history["time"][1:], result.history["checkerboard"][1:])
         for label, result in both
     ]
     decay = diagram(
-        picture("checkerboard"), time, "time [ms]", "checkerboard of v_y [m/s]", yscale="log", ylim=(1e-8, 0.1)
+        picture("checkerboard"),
+        time,
+        x_label="time [ms]",
+        y_label="checkerboard of v_y [m/s]",
+        yscale="log",
+        ylim=(1e-8, 0.1),
     )
     complete, published = (result for _, result in both)
     left = [float(result.history["checkerboard"][-1]) for _, result in both]
@@ -41,11 +46,25 @@ def tell(results, picture) -> Section:
     return Section(
         prose=prose("hanging_bar"),
         rows=[
-            Row("checkerboard of v_y, complete scheme", left[0], "m/s", "visible", 0.0, complete.seconds),
-            Row("checkerboard of v_y, published step", left[1], "m/s", "none visible", 0.0, published.seconds),
-            Row("ratio of the two", left[0] / left[1], "-"),
-            Row("deepest tip, complete scheme", float(complete.history["tip"].min()), "m", None, 2.0 * rest),
-            Row("deepest tip, published step", float(published.history["tip"].min()), "m", None, 2.0 * rest),
+            Row(
+                "checkerboard of v_y, complete scheme",
+                left[0],
+                unit="m/s",
+                paper="visible",
+                exact=0.0,
+                seconds=complete.seconds,
+            ),
+            Row(
+                "checkerboard of v_y, published step",
+                left[1],
+                unit="m/s",
+                paper="none visible",
+                exact=0.0,
+                seconds=published.seconds,
+            ),
+            Row("ratio of the two", left[0] / left[1], unit="-"),
+            Row("deepest tip, complete scheme", float(complete.history["tip"].min()), unit="m", exact=2.0 * rest),
+            Row("deepest tip, published step", float(published.history["tip"].min()), unit="m", exact=2.0 * rest),
         ],
         pictures=[
             Picture(figure6, "Fig. 6: vertical velocity on the deformed mesh at 0.2 s (displacements × 200)."),
@@ -56,5 +75,4 @@ def tell(results, picture) -> Section:
 
 
 def _panel(title, result) -> Panel:
-    position = result.mesh.nodes + MAGNIFIED * result.at("displacement")
-    return Panel(title, position, np.ascontiguousarray(result.at("velocity")[:, 1]), result.mesh)
+    return Panel(title, result.moved(magnified=MAGNIFIED), np.ascontiguousarray(result.at("velocity")[:, 1]))

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..case import Case, Picture, Row, Section, Table
-from ..drawing import BRIGHT, DARK, Curve, draw_curves, new_figure, save
+from ..case import Case, Picture, ReportTable, Row, Section
+from ..drawing import BRIGHT, DARK, Curve, draw_curves, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -27,10 +27,10 @@ def case(quick: bool) -> Case:
         Run(_name("stretched_block", scheme), "stretched_block", settings, RELEASED)
         for scheme, settings in SCHEMES.items()
     ]
-    return Case("tension", tuple(runs), tell)
+    return Case("tension", tuple(runs), section)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Clumping and hourglassing, each by its own measure."""
     held = {scheme: [results[_name("tensile_block", scheme, state)] for state in STRAINS] for scheme in SCHEMES}
     free = {scheme: results[_name("stretched_block", scheme)] for scheme in SCHEMES}
@@ -46,22 +46,27 @@ def tell(results, picture) -> Section:
     return Section(
         prose=prose("tension", rate=rate),
         rows=[
-            Row("held: growth rate, standard SPH", module.growth(standard[0][1], p), "1/s", "clumps", rate),
+            Row(
+                "held: growth rate, standard SPH",
+                module.growth(standard[0][1], p),
+                unit="1/s",
+                paper="clumps",
+                exact=rate,
+            ),
             Row(
                 "held: growth rate, two node sets",
                 module.growth(first.history, p),
-                "1/s",
-                "stable",
-                0.0,
-                first.seconds,
+                unit="1/s",
+                paper="stable",
+                exact=0.0,
+                seconds=first.seconds,
             ),
             Row(
                 "released: length at rest, two node sets",
                 float(published.history["length"][-1]),
-                "m",
-                None,
-                1.0,
-                published.seconds,
+                unit="m",
+                exact=1.0,
+                seconds=published.seconds,
             ),
         ],
         tables=[*_held_tables(named, module, p), _released_table(free)],
@@ -85,24 +90,24 @@ def _name(scene, scheme, state="") -> str:
     return "_".join(filter(None, (scene, scheme, state))).replace(" ", "_")
 
 
-def _held_tables(named, module, p) -> list[Table]:
+def _held_tables(named, module, p) -> list[ReportTable]:
     """Clumping and hourglassing of the held block: schemes down, states across."""
 
     def lines(measure):
         return [(scheme, *(measure(history) for history in histories)) for scheme, histories in named.items()]
 
     return [
-        Table(
+        ReportTable(
             "Clumping: growth rate of the displacements [1/s]:",
             ("held block", *STRAINS),
             lines(lambda history: module.growth(history, p)),
         ),
-        Table(
+        ReportTable(
             "Clumping: smallest distance of two nodes on the way [Δx]:",
             ("held block", *STRAINS),
             lines(lambda history: float(history["smallest_distance"].min() / p.spacing)),
         ),
-        Table(
+        ReportTable(
             "Hourglass: checkerboard of the velocity after 20 ms over the start's (under stress, clumping "
             "alternates too):",
             ("held block", *STRAINS),
@@ -111,13 +116,13 @@ def _held_tables(named, module, p) -> list[Table]:
     ]
 
 
-def _released_table(free) -> Table:
+def _released_table(free) -> ReportTable:
     """Clumping and hourglassing of the released block."""
     first = free["published step"]
     _, standard = first.file.module.standard_sph(first.scene, first.parameters)
     histories = {"standard SPH": standard} | {f"two node sets, {scheme}": r.history for scheme, r in free.items()}
     start = standard["smallest_distance"][0]
-    return Table(
+    return ReportTable(
         "The released block; standard SPH is stopped when a node has left the body:",
         ("", "smallest distance [start's]", "checkerboard of v_x at 5 ms [m/s]", "length at the end [m]"),
         [
@@ -135,33 +140,33 @@ def _released_table(free) -> Table:
 
 
 def _held(named, standard, result, p, path):
-    figure, axes = new_figure(2, 2, (10.5, 9.0))
+    figure, axes = grid(2, 2, size=(10.5, 9.0))
     tension, calm = (list(STRAINS).index(state) for state in ("tension", "no stress"))
     departures = [
         Curve(name, 1e3 * h[tension]["time"], h[tension]["departure"] / p.spacing) for name, h in named.items()
     ]
-    draw_curves(axes[0, 0], departures, "time [ms]", "RMS departure [Δx]")
+    draw_curves(axes[0, 0], departures, x_label="time [ms]", y_label="RMS departure [Δx]")
     checkerboards = [
         Curve(name, 1e3 * h[calm]["time"], 1e3 * h[calm]["checkerboard"]) for name, h in named.items()
     ]
-    draw_curves(axes[0, 1], checkerboards, "time [ms]", "checkerboard of v_x [mm/s]")
+    draw_curves(axes[0, 1], checkerboards, x_label="time [ms]", y_label="checkerboard of v_x [mm/s]")
     axes[0, 0].set(yscale="log", title="tension")
     axes[0, 1].set(ylim=(0.0, None), title="no stress")
     _nodes(axes[1, 0], standard.x, "standard SPH", BRIGHT)
     _nodes(axes[1, 1], result.at("position"), "two node sets, published step", DARK)
-    return save(figure, path)
+    return save_picture(figure, path)
 
 
 def _released(result, path):
     p = SimpleNamespace(**(vars(result.parameters) | {"duration": RELEASED[1]}))
     standard, _ = result.file.module.standard_sph(result.scene, p)
-    figure, axes = new_figure(2, 2, (11.0, 4.8), sharex=True, sharey=True)
+    figure, axes = grid(2, 2, size=(11.0, 4.8), sharex=True, sharey=True)
     moments = [f"{1e3 * time:.3g} ms" for time in result.times]
     _nodes(axes[0, 0], result.at("position", 0), "start", DARK)
     _nodes(axes[0, 1], standard.x, f"standard SPH, {1e3 * standard.time:.3g} ms", BRIGHT)
     _nodes(axes[1, 0], result.at("position", 1), f"two node sets, {moments[1]}", DARK)
     _nodes(axes[1, 1], result.at("position", 2), f"two node sets, {moments[2]}", DARK)
-    return save(figure, path)
+    return save_picture(figure, path)
 
 
 def _nodes(at, points, title, colour) -> None:

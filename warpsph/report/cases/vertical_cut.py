@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ...analysis.measures import Sampler, band_profile, width_at_half
-from ..case import Case, Picture, Row, Section, Table
-from ..drawing import BRIGHT, DARK, Curve, Panel, diagram, draw_curves, fields, new_figure, save
+from ...analysis import Sampler, band_profile, width_at_half
+from ..case import Case, Picture, ReportTable, Row, Section
+from ..drawing import BRIGHT, DARK, Curve, Panel, diagram, draw_curves, draw_fields, grid, save_picture
 from ..prose import prose
 from ..runs import Run
 
@@ -32,7 +32,7 @@ def case(quick: bool) -> Case:
             _run(spacing, (f"spacing={spacing}", *far)),
             _run(f"soft_{spacing}", (f"spacing={spacing}", SOFTENING, *far)),
         ]
-    return Case(SCENE, tuple(runs), tell)
+    return Case(SCENE, tuple(runs), section)
 
 
 def _run(name, settings) -> Run:
@@ -41,7 +41,7 @@ def _run(name, settings) -> Run:
     return Run("_".join(filter(None, (SCENE, name))), SCENE, settings, times)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Figures 17 to 19, the fitted bands, and the band width against the spacing."""
     perfect, soft = results[SCENE], results[f"{SCENE}_soft"]
     slow = results[SLOW]
@@ -75,17 +75,31 @@ def tell(results, picture) -> Section:
     formed, loads = _formed(perfect)
     softened = soft.history["load"]
     rows = [
-        Row("limit load, mean from 0.05 to 0.15 m", float(loads.mean()), "N", PAPER_LOADS, exact, perfect.seconds),
-        Row("load at 0.05 m", float(loads[0]), "N", PAPER_LOADS, exact),
-        Row("load at 0.15 m", float(loads[-1]), "N", PAPER_LOADS, exact),
-        Row("limit load over the footing's width", perfect.check("limit_load"), "N", None, exact),
-        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), "N", None, exact),
-        Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), "°", 45.0, 45.0),
-        Row("band angle, softening", soft.check("band_angle"), "°", 45.0, 45.0, soft.seconds),
-        Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), "-", 0.73),
-        Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), "-", 0.89),
-        Row("peak load, softening", float(softened.max()), "N", None, exact),
-        Row("load at the end, softening", float(softened[-1]), "N", "falls"),
+        Row(
+            "limit load, mean from 0.05 to 0.15 m",
+            float(loads.mean()),
+            unit="N/m",
+            paper=PAPER_LOADS,
+            exact=exact,
+            seconds=perfect.seconds,
+        ),
+        Row("load at 0.05 m", float(loads[0]), unit="N/m", paper=PAPER_LOADS, exact=exact),
+        Row("load at 0.15 m", float(loads[-1]), unit="N/m", paper=PAPER_LOADS, exact=exact),
+        Row("limit load over the footing's width", perfect.check("limit_load"), unit="N/m", exact=exact),
+        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), unit="N/m", exact=exact),
+        Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), unit="°", paper=45.0, exact=45.0),
+        Row(
+            "band angle, softening",
+            soft.check("band_angle"),
+            unit="°",
+            paper=45.0,
+            exact=45.0,
+            seconds=soft.seconds,
+        ),
+        Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), unit="-", paper=0.73),
+        Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), unit="-", paper=0.89),
+        Row("peak load, softening", float(softened.max()), unit="N/m", exact=exact),
+        Row("load at the end, softening", float(softened[-1]), unit="N/m", paper="falls"),
     ]
     above = formed[loads > 1.1 * exact]
     beyond = (
@@ -117,14 +131,14 @@ def _kind(result) -> str:
 
 
 def _formed(result):
-    """Settlements [m] and loads [N] while the mechanism stands and the shape has hardly changed."""
+    """Settlements [m] and loads [N/m] while the mechanism stands and the shape has hardly changed."""
     low, high = result.file.module.MECHANISM
     settlement, load = result.history["settlement"], result.history["load"]
     inside = (settlement >= low) & (settlement <= high * (1.0 + 1e-9))
     return settlement[inside], load[inside]
 
 
-def _loads(results, perfect, finer, exact) -> Table:
+def _loads(results, perfect, finer, exact) -> ReportTable:
     """The limit load at other spacings, a smaller step, and slower loading."""
     slow = results[SLOW]
     varied = [("as above", perfect)]
@@ -133,16 +147,16 @@ def _loads(results, perfect, finer, exact) -> Table:
         ("Courant 0.5", results[f"{SCENE}_step"]),
         (f"footing pressed with {slow.parameters.acceleration:g} m/s²", slow),
     ]
-    return Table(
+    return ReportTable(
         "What the limit load depends on (Δx = 0.5 m, Courant number 1 and 3e-5 m/s² unless said):",
-        ("", "mean load [N]", "to exact", "load at 0.15 m [N]", "to exact", "run time [s]"),
+        ("", "mean load [N/m]", "to exact", "load at 0.15 m [N/m]", "to exact", "run time [s]"),
         [_load_line(name, result, exact) for name, result in varied],
     )
 
 
-def _width_table(widths) -> Table:
+def _width_table(widths) -> ReportTable:
     """Band widths against the spacing."""
-    return Table(
+    return ReportTable(
         f"Width of the band at half its height, at {WIDTH_AT} m of settlement:",
         ("Δx [m]", "H = 0 [m]", "softening [m]", "H = 0 [Δx]", "softening [Δx]"),
         [(f"{dx:g}", *both, *(width / dx for width in both)) for dx, both in widths.items()],
@@ -186,10 +200,10 @@ def _figure17(perfect, soft, exact, path):
         [
             Curve("perfectly viscoplastic, H = 0", perfect.history["settlement"], perfect.history["load"]),
             Curve("softening, H = −1e3 Pa", soft.history["settlement"], soft.history["load"]),
-            Curve(f"exact, {exact:.1f} N", [0.0, end], [exact, exact], exact=True),
+            Curve(f"exact, {exact:.1f} N/m", [0.0, end], [exact, exact], exact=True),
         ],
-        "settlement of the footing [m]",
-        "load [N]",
+        x_label="settlement of the footing [m]",
+        y_label="load [N/m]",
         ylim=(0.0, None),
     )
 
@@ -199,33 +213,31 @@ def _evolution(perfect, soft, path):
         [
             Panel(
                 f"{_kind(result)}, settlement {settlement:g} m",
-                result.at("position", k),
+                result.moved(k),
                 result.at("equivalent_plastic_strain", k),
-                result.mesh,
             )
             for result in (perfect, soft)
         ]
         for k, settlement in enumerate(SETTLEMENTS)
         if k > 0
     ]
-    return fields(path, rows, "equivalent viscoplastic strain [-]", (8.5, 10.5), edges=False)
+    return draw_fields(path, rows, label="equivalent viscoplastic strain [-]", size=(8.5, 10.5), edges=False)
 
 
 def _figure19(perfect, soft, path):
     row = [
         Panel(
             _kind(result),
-            result.mesh.nodes + 2.0 * result.at("displacement"),
+            result.moved(magnified=2.0),
             np.linalg.norm(result.at("displacement"), axis=1),
-            result.mesh,
         )
         for result in (perfect, soft)
     ]
-    return fields(path, [row], "displacement [m]", (10.5, 5.0))
+    return draw_fields(path, [row], label="displacement [m]", size=(10.5, 5.0))
 
 
 def _bands(pair, path):
-    figure, axes = new_figure(1, len(pair), (10.5, 5.2), sharey=True)
+    figure, axes = grid(1, len(pair), size=(10.5, 5.2), sharey=True)
     for at, result in zip(axes[0], pair, strict=True):
         strain, nodes = result.at("equivalent_plastic_strain"), result.mesh.nodes
         band = result.file.module.band(result.mesh, strain)
@@ -235,22 +247,24 @@ def _bands(pair, path):
         at.set_title(f"{_kind(result)}: {abs(band.angle):.1f}°", fontsize=10)
         at.set(aspect="equal", xlim=(2.5, 10.3), ylim=(2.5, 10.3), xlabel="X [m]", ylabel="Y [m]")
         at.label_outer()
-    return save(figure, path)
+    return save_picture(figure, path)
 
 
 def _widths(found, path):
     """The picture of the profiles across the bands, and spacing → widths [m] without and with softening."""
-    figure, axes = new_figure(1, 2, (10.5, 4.0), sharey=True)
+    figure, axes = grid(1, 2, size=(10.5, 4.0), sharey=True)
     widths, curves = {}, {"perfectly viscoplastic": [], "softening": []}
     for result in sorted(found, key=lambda result: -result.parameters.spacing):
         strain = result.at("equivalent_plastic_strain", SETTLEMENTS.index(WIDTH_AT))
         band = result.file.module.band(result.mesh, strain)
-        sample = Sampler(result.mesh.nodes, result.mesh.cells, strain)
-        across, profile = band_profile(sample, band, REACH)
+        sample = Sampler(result.mesh, strain)
+        across, profile = band_profile(sample, band, reach=REACH)
         widths.setdefault(result.parameters.spacing, []).append(width_at_half(across, profile))
         curves[_kind(result)].append(Curve(f"Δx = {result.parameters.spacing:g} m", across, profile))
     for at, (kind, lines) in zip(axes[0], curves.items(), strict=True):
-        draw_curves(at, lines, "distance from the band's axis [m]", "equivalent viscoplastic strain [-]")
+        draw_curves(
+            at, lines, x_label="distance from the band's axis [m]", y_label="equivalent viscoplastic strain [-]"
+        )
         at.set_title(kind, fontsize=10)
         at.label_outer()
-    return save(figure, path), widths
+    return save_picture(figure, path), widths

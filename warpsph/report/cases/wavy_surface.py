@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..case import Case, Picture, Row, Section, Table
+from ..case import Case, Picture, ReportTable, Row, Section
 from ..prose import prose
 from ..runs import Run
 
@@ -15,10 +15,10 @@ OTHERS = ("disc", "ellipse", "staircase")
 def case(quick: bool) -> Case:
     """The same in the quick form."""
     others = (Run(f"{SCENE}_{body}", SCENE, (f"body={body}",)) for body in OTHERS)
-    return Case(SCENE, (IMPROVED, MARRONE, *others), tell)
+    return Case(SCENE, (IMPROVED, MARRONE, *others), section)
 
 
-def tell(results, picture) -> Section:
+def section(results, picture) -> Section:
     """Classification and both normals as pictures; angles of all bodies, the staircase beside the smooth ones."""
     wave = results[IMPROVED.name]
     bodies = {body: wave.file.module.compare(body, wave.parameters) for body in wave.file.module.BODIES}
@@ -26,8 +26,11 @@ def tell(results, picture) -> Section:
     return Section(
         prose=prose(SCENE),
         rows=[
-            *(Row(f"{b}, mean angle, improved normals", float(bodies[b][0]), "°", None, 0.0) for b in bodies),
-            *(Row(f"{b}, mean angle, Marrone's normals", float(bodies[b][1]), "°", None, 0.0) for b in bodies),
+            *(Row(f"{b}, mean angle, improved normals", float(bodies[b][0]), unit="°", exact=0.0) for b in bodies),
+            *(
+                Row(f"{b}, mean angle, Marrone's normals", float(bodies[b][1]), unit="°", exact=0.0)
+                for b in bodies
+            ),
         ],
         pictures=[
             Picture(
@@ -38,7 +41,7 @@ def tell(results, picture) -> Section:
         ],
         results=[wave],
         tables=[
-            Table(
+            ReportTable(
                 "Nodes misjudged (interior nodes called free, or edge nodes missed):",
                 tuple(bodies),
                 [tuple(str(bodies[body][2]) for body in bodies)],

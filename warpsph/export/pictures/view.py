@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import matplotlib
@@ -12,13 +13,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from ..mesh.mesh import Mesh
-from .frames import Frame, Frames
-from .plots import COLOUR_MAP, DARK, beyond, draw_cells, percentiles, span_of
-from .quantity import Quantity
+from ...mesh.mesh import Mesh
+from ..colours import COLOUR_MAP, beyond, percentiles, span_of
+from ..quantity import Quantity, Snapshot
+from .figures import DARK, GREY, draw_cells, new_figure
 
 MARGIN = 0.04
-GRID = "#8a8a8a"
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class View:
     high: np.ndarray
 
     @classmethod
-    def of(cls, frames: Frames, quantity: Quantity) -> View:
-        """The view that shows all frames."""
+    def of(cls, frames: Iterable[Snapshot], quantity: Quantity) -> View:
+        """The view that shows all frames: those of a run, or one simulation as it is now."""
         spans, values, corners = [], [], []
         for frame in frames:
             shown, position = quantity(frame), frame.field("position")
@@ -61,7 +61,18 @@ class View:
         """New axes for it."""
         return figure.add_subplot(*place, projection="3d" if len(self.low) == 3 else None)
 
-    def draw(self, axes: Axes, frame: Frame, **style) -> None:
+    def figure(self) -> tuple[Figure, Axes]:
+        """A figure for one frame, as the body is shaped, and its axes."""
+        ratio = self.width_to_height
+        wide = ratio > 1.5
+        size = (8.0, 1.9 + 7.2 / ratio) if wide else (7.5, 6.5) if ratio > 0.7 else (2.6 + 6.0 * ratio, 7.0)
+        figure = new_figure((7.0, 4.0) if len(self.low) == 1 else size)
+        axes = self.axes(figure)
+        place = {"location": "bottom"} if wide else {}
+        self.colour_bar(figure, axes, shrink=0.8, aspect=30, **place)
+        return figure, axes
+
+    def draw(self, axes: Axes, frame: Snapshot, **style) -> None:
         """Draw a frame into its axes."""
         position, values = frame.field("position"), self.quantity(frame)
         if len(self.low) == 1:
@@ -71,7 +82,7 @@ class View:
             axes.set_ylim(self.values[0] - room, self.values[1] + room)
             axes.grid(alpha=0.3)
         elif len(self.low) == 2:
-            draw_cells(axes, position, values, frame.mesh, self.span, **style)
+            draw_cells(axes, frame.mesh.with_nodes(position), values, span=self.span, **style)
             axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
         else:
             colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.mesh, values)))
@@ -83,7 +94,7 @@ class View:
             )
             axes.set_box_aspect(self.high - self.low)
 
-    def draw_grid(self, axes: Axes, frame: Frame) -> None:
+    def draw_grid(self, axes: Axes, frame: Snapshot) -> None:
         """Draw the deformed cells over the outline of the initial body, magnified where they hardly move."""
         displacement, mesh = frame.field("displacement"), frame.mesh
         scale = magnification(np.linalg.norm(displacement, axis=1).max(), np.ptp(mesh.nodes, axis=0).max())
@@ -98,7 +109,7 @@ class View:
             cut = np.full((len(around), 1, 2), np.nan)
             axes.plot(*np.concatenate([around, cut], axis=1).reshape(-1, 2).T, color=DARK, linewidth=0.4)
             edges = np.concatenate([mesh.nodes[mesh.faces], np.full((len(mesh.faces), 1, 2), np.nan)], axis=1)
-            axes.plot(*edges.reshape(-1, 2).T, color=GRID, linewidth=1.0, linestyle="--")
+            axes.plot(*edges.reshape(-1, 2).T, color=GREY, linewidth=1.0, linestyle="--")
             axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
         axes.set_title(
             f"deformation, t = {frame.time:.4g} s" + (f" (× {scale:g})" if scale != 1.0 else ""), fontsize=10

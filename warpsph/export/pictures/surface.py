@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from ..simulation.simulation import Simulation
-from .plots import save_picture
+from ...simulation.simulation import Simulation
+from .figures import BRIGHT, DARK, GREY, new_figure, save_picture
 
 
 def plot_surface(simulation: Simulation, path: Path) -> bool:
@@ -20,13 +18,12 @@ def plot_surface(simulation: Simulation, path: Path) -> bool:
     free = simulation.field("free_surface").astype(bool)
     extent = np.ptp(position, axis=0)
     height = float(np.clip(8.0 * extent[1] / extent[0], 3.0, 9.0)) + 0.6
-    figure = Figure(figsize=(8.0, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure((8.0, height))
     axes = figure.add_subplot()
     size = np.clip(2e3 / len(position) ** 0.5, 4.0, 40.0)
-    axes.scatter(*position[~free].T, s=0.5 * size, color="#8a8a8a", linewidths=0, label="not on the free surface")
-    axes.scatter(*position[free].T, s=size, color="#c26a00", linewidths=0, label="on the free surface")
-    axes.quiver(*position[free].T, *normal[free].T, color="#00204d", width=0.002, scale=22.0, label="normal")
+    axes.scatter(*position[~free].T, s=0.5 * size, color=GREY, linewidths=0, label="not on the free surface")
+    axes.scatter(*position[free].T, s=size, color=BRIGHT, linewidths=0, label="on the free surface")
+    axes.quiver(*position[free].T, *normal[free].T, color=DARK, width=0.002, scale=22.0, label="normal")
     axes.margins(0.08)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")

@@ -1,0 +1,61 @@
+"""A body on a device: what it is made of, its nodes and its cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from ..device.launching import Launcher
+from ..materials.law import Law
+from ..mesh.kinds import CellKind
+from ..physics.space import Space
+from ..scene.scene import Scene
+from .cells import NodeCells, node_cells
+from .nodes import auxiliary_nodes, material_internals, material_nodes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """One material, one kind of cell, and the arrays that every part of a step works on.
+
+    Attributes:
+        scene: the scene it is of.
+        space: its continuum and precision.
+        kind: the kind of its cells.
+        law: its material's law.
+        parameters: the law's parameters.
+        nodes: material nodes (struct of arrays, see `warpsph.state.nodes`).
+        internals: what each node remembers of the material, or None.
+        auxiliary: auxiliary nodes.
+        node_cells: the cells around each node.
+        launcher: launches the kernels that work on it.
+    """
+
+    scene: Scene
+    space: Space
+    kind: CellKind
+    law: Law
+    parameters: object
+    nodes: object
+    internals: wp.array | None
+    auxiliary: object
+    node_cells: NodeCells
+    launcher: Launcher
+
+    @staticmethod
+    def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
+        """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
+        law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
+        return Body(
+            scene=scene,
+            space=space,
+            kind=kind,
+            law=law,
+            parameters=law.fill(scene.material),
+            nodes=material_nodes(scene, space, device),
+            internals=material_internals(scene, law, space, device),
+            auxiliary=auxiliary_nodes(scene, space, kind, device),
+            node_cells=node_cells(scene.mesh, device),
+            launcher=launcher,
+        )

@@ -1,0 +1,127 @@
+"""Cells on the device: which cells a node is a corner of, and what a pass over the cells leaves of each."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import warp as wp
+
+from ..device.arrays import natural, packed
+from ..errors import SceneError
+from ..mesh.kinds import CellKind
+from ..mesh.mesh import Mesh
+from ..physics.space import Space
+
+
+@wp.struct
+class NodeCells:
+    """The cells around node i: place[first[i]], …, place[first[i + 1] − 1], each cell · corners + corner."""
+
+    first: wp.array(dtype=wp.int32)
+    place: wp.array(dtype=wp.int32)
+
+
+def cell_table(mesh: Mesh, kind: CellKind, device: wp.Device) -> wp.array:
+    """The corners of each cell, shape (m, c), for kernels that were built for a kind.
+
+    Raises:
+        SceneError: the cells have another number of corners; kernels would read across their rows.
+    """
+    if mesh.cells.shape[1] != kind.corners:
+        allowed = f"kernels built for a {kind.name} read {kind.corners} corners a cell"
+        raise SceneError("cells", f"{mesh.cells.shape[1]} corners", allowed)
+    return wp.array(mesh.cells, dtype=wp.int32, device=device)
+
+
+def node_cells(mesh: Mesh, device: wp.Device) -> NodeCells:
+    """The cells around each node, in the order of the corners it is of them."""
+    table = NodeCells()
+    table.first, table.place = (wp.array(row, dtype=wp.int32, device=device) for row in mesh.cells_of_nodes())
+    return table
+
+
+@cache
+def corner_place(kind: CellKind) -> wp.Function:
+    """(number of an entry, NodeCells) → (cell, which corner of it the node is)."""
+    packed_table = packed(NodeCells)
+
+    @wp.func
+    def place_of(entry: int, table: NodeCells):
+        packed_table(table)
+        place = table.place[entry]
+        natural(place)
+        cell = place // wp.static(kind.corners)
+        return cell, place - wp.static(kind.corners) * cell
+
+    return place_of
+
+
+@dataclass(frozen=True)
+class CellStore:
+    """What is kept of each cell from one pass to the next, as numbers side by side.
+
+    Attributes:
+        columns: number of hourglass modes kept; at least one, since Warp has no matrix without columns.
+        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each) and `frame` (∇ξ_a in row a).
+        by_number: whether the same number of consecutive cells stands side by side in memory, for a GPU whose
+            threads read it together, or all the numbers of a cell, for the vector registers of a CPU.
+        size: how many numbers a cell has.
+        write: (cell, Cell, numbers) → nothing.
+        read: (cell, numbers) → Cell.
+        packed: (numbers) → nothing: for the compiler, see `warpsph.device.arrays`.
+    """
+
+    columns: int
+    Cell: type
+    by_number: bool
+    size: int
+    write: wp.Function
+    read: wp.Function
+    packed: wp.Function
+
+    def new(self, m: int, space: Space, device: wp.Device) -> wp.array:
+        """The numbers of m cells, zero, shape (size, m)."""
+        if self.by_number:
+            return wp.zeros((self.size, m), dtype=space.real, device=device)
+        return wp.zeros((m, self.size), dtype=space.real, device=device).transpose()
+
+
+@cache
+def cell_store(space: Space, kind: CellKind, by_number: bool) -> CellStore:
+    """How the cells of a kind are kept."""
+    d, size, columns = space.dim, space.types.size, max(1, len(kind.modes))
+    modes_at = size * d  # where a cell's modes begin among its numbers, and where its frame does
+    frame_at = modes_at + size * columns
+    packed_numbers = packed(wp.array2d(dtype=space.real), axis=1 if by_number else 0)
+
+    @wp.struct
+    class Cell:
+        gradient: space.types.phi_gradient
+        modes: space.mat(size, columns)
+        frame: space.types.tensor
+
+    @wp.func
+    def write(a: int, cell: Cell, numbers: wp.array2d(dtype=space.real)):
+        packed_numbers(numbers)
+        for i in range(wp.static(size)):
+            for j in range(wp.static(d)):
+                numbers[d * i + j, a] = cell.gradient[i, j]
+            for j in range(wp.static(columns)):
+                numbers[modes_at + columns * i + j, a] = cell.modes[i, j]
+        for i in range(wp.static(d)):
+            for j in range(wp.static(d)):
+                numbers[frame_at + d * i + j, a] = cell.frame[i, j]
+
+    @wp.func
+    def read(a: int, numbers: wp.array2d(dtype=space.real)):
+        cell = Cell()
+        for i in range(wp.static(size)):
+            for j in range(wp.static(d)):
+                cell.gradient[i, j] = numbers[d * i + j, a]
+            for j in range(wp.static(columns)):
+                cell.modes[i, j] = numbers[modes_at + columns * i + j, a]
+        for i in range(wp.static(d)):
+            for j in range(wp.static(d)):
+                cell.frame[i, j] = numbers[frame_at + d * i + j, a]
+        return cell
+
+    return CellStore(columns, Cell, by_number, frame_at + d * d, write, read, packed_numbers)
