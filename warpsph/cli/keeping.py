@@ -24,8 +24,9 @@ def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Si
         return []
     followers, times = [], evenly(end, settings.frames)
     if path:
-        from ..export.usd_live import LiveStage  # USD is slow to import
+        from ..export.usd_live import LiveStage, check_clips  # USD is slow to import
 
+        check_clips(path)
         followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))
 
     def recorder(simulation: Simulation) -> Lenient:

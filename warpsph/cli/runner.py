@@ -13,7 +13,7 @@ from typing import Protocol
 
 from .. import __version__
 from ..errors import NonFiniteError, SceneError, StoppedError
-from ..export.frame_files import read_about
+from ..export.frame_files import read_about, times_of_frames
 from ..export.pictures.field import plot_field
 from ..export.pictures.history import plot_history
 from ..export.pictures.surface import plot_surface
@@ -160,7 +160,8 @@ def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
     _ = scene.probe_identities  # of the probes as they are before they are called
     if restart.checkpoint is not None:
         restart.checkpoint.restore(simulation)
-        read_about(folder)
+        about = read_about(folder)
+        _ = about and times_of_frames(folder, about)  # refused now, not when half of it is done
     else:
         with file.errors_located():
             for probe in scene.output.probes:
