@@ -120,6 +120,7 @@ def test_run_until_skips_the_checks(tmp_path, capsys):
 def test_results_go_to_runs_scene_unless_told(tmp_path):
     assert run("elastic_bar", "--until", "1e-4", "--quiet") == 0
     assert sorted(p.name for p in (tmp_path / "runs" / "elastic_bar").iterdir()) == [
+        ".warpsph",
         "field.png",
         "frames",
         "history.csv",

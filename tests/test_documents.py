@@ -12,7 +12,8 @@ import pytest
 import warpsph
 from tests.documents import LAW, PAGES, ROOT, blocks, run_as_module
 from warpsph.cli.main import _parser, main
-from warpsph.cli.stored import StoredScene, tomllib
+from warpsph.cli.stored import StoredScene
+from warpsph.storage.reading import tomllib
 
 sys.path.insert(0, str(ROOT / "tools"))
 import cell_picture

@@ -111,7 +111,7 @@ def _turn(dim):
 
 def test_a_new_run_removes_the_frames_of_the_former(tmp_path):
     for count in (8, 2, 0):
-        arguments = ["run", "elastic_bar", "--until", "1e-3", "--quiet", "--device", "cpu"]
+        arguments = ["run", "elastic_bar", "--until", "1e-3", "--quiet", "--device", "cpu", "--overwrite"]
         assert main([*arguments, "--frames", str(count), "--out", str(tmp_path)]) == 0
         assert len(list((tmp_path / "frames").glob("0*.npz"))) == (count + 1 if count else 0)
     with pytest.raises(SceneError, match="kept frames"):

@@ -12,8 +12,9 @@ import pytest
 from warpsph.cli.catalogue import load, shipped
 from warpsph.cli.interval import parse_interval
 from warpsph.cli.main import main
-from warpsph.cli.stored import open_scene, read_toml
+from warpsph.cli.stored import open_scene
 from warpsph.scene.fingerprint import fingerprint
+from warpsph.storage.reading import read_toml
 
 # {stop} runs after each step: it may send the process a signal.
 SCENE = '''"""Block under gravity."""
@@ -127,7 +128,9 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
     path = block("pass")
     assert run(path, "--checkpoint-every", "10", "--until", "0.1", "--out", "out") == 0
     assert (tmp_path / "out" / "checkpoint.npz").is_file()
-    assert run(path, "--until", "0.1", "--out", "out") == 0
+    assert run(path, "--until", "0.1", "--out", "out") == 2, "it asks first"
+    assert (tmp_path / "out" / "checkpoint.npz").is_file()
+    assert run(path, "--until", "0.1", "--out", "out", "--overwrite") == 0
     assert not (tmp_path / "out" / "checkpoint.npz").exists()
 
 
@@ -138,7 +141,7 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
         (["--resume", "nowhere"], r"checkpoint = 'nowhere/checkpoint\.npz' .*there is no checkpoint"),
         (
             ["--resume", "early"],
-            r"no checkpoint yet; start again with: warpsph run early/scene\.toml --out early",
+            r"no checkpoint yet; start again with: warpsph run early/scene\.toml --out early --overwrite",
         ),
         (["block.py", "--resume", "out", "--set", "wave=0.002"], "of another scene, or of other parameters"),
         (["elastic_bar", "--resume", "out"], "of another scene, or of other parameters, than elastic_bar"),
@@ -181,7 +184,7 @@ def test_stored_scene_repeats_its_run_to_the_last_bit(block, precision, tmp_path
             "velocity": 45,
             "conditions.1.on.second.numbers": 27,
         }
-    stored = read_toml(tmp_path / "moved" / "scene.toml")
+    stored = read_toml("scene", tmp_path / "moved" / "scene.toml")
     assert stored["stress"] == [-100.0, -200.0, 0.0, -100.0], "a uniform field is a list"
     assert stored["code"]["parameters"]["spacing"] == 0.125
 

@@ -11,9 +11,9 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from warpsph.cli.main import main
-from warpsph.cli.stored import read_toml
 from warpsph.frames import Frames
 from warpsph.simulation.checkpoint import Checkpoint
+from warpsph.storage.reading import read_toml
 
 SCENE = '''"""Block that is pressed; a signal comes after the step `stop_at`."""
 import os, signal
@@ -93,7 +93,8 @@ def test_run_that_goes_on_keeps_its_frames_and_stage_as_if_it_had_never_stopped(
     monkeypatch.setenv("NO_SIGNAL", "yes")
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
-    assert run("--resume", "../parts") == 0
+    assert run("--resume", "../parts") == 2, "its stage stands outside of its folder"
+    assert run("--resume", "../parts", "--usd", "../parts.usdc") == 0
     monkeypatch.chdir("..")
     one, other = Frames("whole"), Frames("parts")
     assert one.about == other.about and one.numbers == other.numbers == list(range(13))
@@ -110,22 +111,24 @@ def test_stopped_run_leaves_what_a_reader_needs(capsys):
     """Nothing of a former run in its folder; everything up to where it stopped, whole."""
     folder = Path("out")
     folder.mkdir()
-    for name in ("summary.json", "surface.png"):
+    for name in ("summary.json", "surface.png", ".warpsph"):
         (folder / name).write_text("of a former run")
-    status = run("block.py", "--set", f"stop_at={STOP}", *OPTIONS, "--usd", "run.usda", "--out", "out")
+    status = run(
+        "block.py", "--set", f"stop_at={STOP}", *OPTIONS, "--usd", "run.usda", "--out", "out", "--overwrite"
+    )
     assert status == 128 + signal.SIGTERM
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "go on with: warpsph run --resume out" in said
+    assert said.count("\n") == 1 and "go on with: warpsph run --resume out --usd run.usda\n" in said
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["stopped"] and summary["error"] is None and summary["steps"] == STOP
     assert {path.name for path in folder.iterdir()} == {
         *("summary.json", "history.csv", "history.png", "field.png", "frames"),
-        *("scene.toml", "scene_file.py", "checkpoint.npz"),
+        *("scene.toml", "scene_file.py", "checkpoint.npz", ".warpsph"),
     }
     kept = len(Frames("out"))
     assert points("run.usda")[1].shape == (kept, 45, 3)
     assert main(["plot", "out"]) == 0 and (folder / "overview.png").is_file()
-    assert len(exported("out")) == 2 + kept
+    assert len(exported("out")) == 3 + kept, "and the mark of the folder of frames"
 
 
 def test_options_given_with_resume_win_and_are_remembered_in_turn(monkeypatch):
@@ -149,7 +152,8 @@ def test_repeated_run_keeps_as_many_frames_and_leaves_the_first_one_s_stage_alon
     shutil.copytree("first/frames", "second/expected")
     for path in Path("second/expected").iterdir():
         assert path.read_bytes() == (Path("second/frames") / path.name).read_bytes()
-    assert read_toml(Path("second/scene.toml"))["run"] == read_toml(Path("first/scene.toml"))["run"]
+    first, second = (read_toml("scene", Path(name) / "scene.toml")["run"] for name in ("first", "second"))
+    assert first == second
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,10 @@ class SceneError(WarpSPHError, ValueError):
         super().__init__(" ".join(f"{field} = {_short(value)} is not allowed: {allowed}".split()))
 
 
+class DamagedError(SceneError):
+    """A file that a run has left can not be read: it is there, and nobody may act as if it were not."""
+
+
 class BreakdownError(WarpSPHError, ArithmeticError):
     """A run came to something that can not be true, and ended there; what was recorded before stays.
 

@@ -51,7 +51,16 @@ class SceneFile:
     name: str
     module: ModuleType
     neighbours: Neighbours
-    settings = Settings()  # how it is run unless asked otherwise
+
+    @property
+    def origin(self) -> tuple[Path, Path, bool]:
+        """The file, the folder of the modules it may import, and whether it has checks."""
+        path = Path(self.module.__file__)
+        return path, path.parent, hasattr(self.module, "checks")
+
+    def run_settings(self, folder: Path, usd: str | None = None) -> Settings:
+        """How it is run unless asked otherwise."""
+        return Settings()
 
     @property
     def description(self) -> str:

@@ -9,6 +9,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import IO
 
+from .parent import for_child
+
 INTERRUPTED = 128 + signal.SIGINT
 
 
@@ -34,7 +36,11 @@ class Children:
         if self._stopping.is_set():
             return INTERRUPTED
         process = subprocess.Popen(
-            command, stdout=output, stderr=output, start_new_session=True, env={**environment, **os.environ}
+            command,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+            env={**environment, **os.environ, **for_child()},
         )
         self._running.add(process)
         if self._stopping.is_set():  # the signal came just before

@@ -7,6 +7,7 @@ from importlib import import_module
 
 from ..errors import SceneError
 from ..export.frames import Frames
+from ..storage.owner import owned_file
 from ..validate import number
 from .keeping import USD, kept_frames, target
 
@@ -39,12 +40,16 @@ def _export(options: argparse.Namespace) -> int:
     frames = kept_frames(options.dir)
     path = target("FILE", options.file, tuple(WRITERS))
     writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
+    if path.suffix in USD:
+        colouring = _colouring(options, frames)
+    else:
+        _refuse_colours(options)
     try:
-        if path.suffix in USD:
-            writer.write_stage(frames, path, _colouring(options, frames))
-        else:
-            _refuse_colours(options)
-            writer.write_series(frames, path)
+        with owned_file(path, "FILE"):
+            if path.suffix in USD:
+                writer.write_stage(frames, path, colouring)
+            else:
+                writer.write_series(frames, path)
     except OSError as error:
         raise SceneError("FILE", options.file, f"it must be a file that can be written ({error})") from None
     print(f"{path}: {len(frames)} frames, {len(frames.mesh.nodes)} nodes")

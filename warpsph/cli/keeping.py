@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..errors import SceneError, one_of
-from ..export.frames import Follower, Frames, FrameWriter, clear, evenly
+from ..export.frames import Follower, Frames, FrameWriter, evenly
 from ..simulation.simulation import Simulation
 from .settings import Settings
 
@@ -21,33 +21,18 @@ def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Si
     """What makes the observer that keeps the frames of a run until `end` [s], and its USD stage."""
     path = target("--usd", settings.usd, USD) if settings.usd else None
     if not settings.frames:
-        return [lambda simulation: _NoFrames(simulation, folder)]
+        return []
     followers, times = [], evenly(end, settings.frames)
     if path:
-        from ..export.usd_live import LiveStage  # USD is slow to import
+        from ..export.usd_live import LiveStage, check_clips  # USD is slow to import
 
+        check_clips(path)
         followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))
 
     def recorder(simulation: Simulation) -> Lenient:
         return Lenient(lambda: FrameWriter(simulation, times, folder, followers), "no further frames are kept")
 
     return [recorder]
-
-
-class _NoFrames:
-    """Keeps no frames; a new run removes those of a former one, which would be taken for its own."""
-
-    next_time = math.inf
-
-    def __init__(self, simulation: Simulation, folder: Path):
-        if not simulation.steps:
-            clear(folder)
-
-    def observe(self, simulation: Simulation) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing."""
 
 
 class Lenient:
@@ -97,15 +82,8 @@ def kept_frames(text: str) -> Frames:
 
 
 def target(option: str, text: str, suffixes: tuple[str, ...]) -> Path:
-    """The path of a file to be written, in a folder that is made if need be."""
+    """The path of a file to be written, by its suffix one that can be."""
     path = Path(text)
     if path.suffix not in suffixes:
         raise SceneError(option, text, one_of([f"NAME{suffix}" for suffix in suffixes]))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.with_name(f".{path.name}.warpsph")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise SceneError(option, text, f"it must be a file that can be written ({error})") from None
     return path

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
 from .. import __version__
 from ..errors import SceneError, StoppedError
+from ..storage.names import printable
 from . import new, sweep_command
 from .catalogue import load, shipped
 from .exporting import add_export
+from .parent import end_with_parent
 from .plotting import add_plot
 from .run_command import add_run
+from .streams import steady_streams
 
 # Rooms above this one add their commands by these modules: a name, since imports point down.
 FURTHER = ("warpsph.report.command",)
@@ -22,24 +24,25 @@ FURTHER = ("warpsph.report.command",)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; the exit status is 0 for success, 1 for a failed check or run, 2 for bad input."""
-    options = _parser().parse_args(arguments)
-    try:
-        return options.command(options)
-    except SceneError as error:
-        print(f"warpsph: {error}", file=sys.stderr)
-        return 2
-    except StoppedError as stop:
-        print(f"warpsph: {stop}", file=sys.stderr)
-        return stop.status
-    except KeyboardInterrupt:
-        print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # the reader of our output has gone, e.g. `warpsph list | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except OSError as error:  # a disk that is full, above all
-        print(f"warpsph: {error}", file=sys.stderr)
-        return 1
+    with steady_streams():
+        end_with_parent()
+        options = _parser().parse_args(arguments)
+        try:
+            for text in sys.argv[1:] if arguments is None else arguments:
+                printable("argument", text)
+            return options.command(options)
+        except SceneError as error:
+            print(f"warpsph: {error}", file=sys.stderr)
+            return 2
+        except StoppedError as stop:
+            print(f"warpsph: {stop}", file=sys.stderr)
+            return stop.status
+        except KeyboardInterrupt:
+            print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
+            return 130
+        except OSError as error:  # a disk that is full, above all
+            print(f"warpsph: {error}", file=sys.stderr)
+            return 1
 
 
 def _parser() -> argparse.ArgumentParser:

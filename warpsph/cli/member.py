@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import SceneError
-from ..simulation.checkpoint import CHECKPOINT
+from ..errors import DamagedError, SceneError
+from ..simulation.checkpoint import CHECKPOINT, Checkpoint
 from ..simulation.device import THREADS
+from ..storage.reading import file_digest, read_toml
 from .catalogue import load
 from .children import CHILDREN
+from .run_folder import SCENE, SUMMARY
 from .scene_run import SceneRun
-from .stored import SCENE, read_toml
 
 
 @dataclass(frozen=True)
@@ -39,35 +39,50 @@ class Member(SceneRun):
             return 0.0
 
     def done(self, folder: Path) -> bool:
-        """Whether the folder holds this run, of the scene file as it is now, this precision and frames."""
-        try:
-            stored = read_toml(folder / SCENE)
-            path = Path(load(self.scene).module.__file__)
-            same = stored["code"]["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
-            how = stored["run"]
-            same = same and (how["precision"], how["frames"]) == (self.precision, self.frames)
-            return same and super().done(folder)
-        except (OSError, ValueError, KeyError, SceneError):
+        """Whether the folder holds this run, of the scene file as it is now, this precision and frames.
+
+        Raises:
+            DamagedError: what it holds can not be read, and so not be told from what is missing.
+        """
+        if not (folder / SUMMARY).exists() or not (folder / SCENE).exists():
             return False
+        path = Path(load(self.scene).module.__file__)
+        stored = read_toml("scene", folder / SCENE)
+        code, how = stored.get("code"), stored.get("run")
+        same = isinstance(code, dict) and code.get("sha256") == file_digest(path)
+        same = same and isinstance(how, dict)
+        same = same and (how.get("precision"), how.get("frames")) == (self.precision, self.frames)
+        return same and super().done(folder)
 
     def make(self, folder: Path, device: str | None) -> None:
         """Make it, from its checkpoint where it has one; what it prints goes into `log.txt`."""
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").unlink(missing_ok=True)
-        command = [sys.executable, "-m", "warpsph", "run", self.scene, "--out", str(folder)]
+        command = [sys.executable, "-m", "warpsph", "run", self.scene]
         command += [part for setting in self.settings for part in ("--set", setting)]
         command += ["--precision", self.precision, "--frames", str(self.frames)]
         command += ["--device", device] if device else []
+        anew = [*command, "--out", str(folder), "--overwrite"]
         status = 2
-        if (folder / CHECKPOINT).is_file():
+        if _has_checkpoint(folder / CHECKPOINT):
             status = _call([*command, "--resume", str(folder)], folder)
-        if status == 2:  # there is no checkpoint, or it is refused
-            status = _call(command, folder)
+        if status == 2:  # there is no checkpoint, or it is of another scene
+            status = _call(anew, folder)
         if status not in (0, 1):
-            (folder / "summary.json").unlink(missing_ok=True)  # its checks raised: it is not done
+            (folder / SUMMARY).unlink(missing_ok=True)  # its checks raised: it is not done
             raise RuntimeError(last_line(folder) if status > 0 else f"its process ended by signal {-status}")
-        if not (folder / "summary.json").is_file():
+        if not (folder / SUMMARY).is_file():
             raise RuntimeError(last_line(folder))
+
+
+def _has_checkpoint(path: Path) -> bool:
+    """Whether there is one of this version; a damaged one is not the same as none."""
+    try:
+        Checkpoint.read(path)
+    except DamagedError:
+        raise
+    except SceneError:
+        return False
+    return True
 
 
 def _call(command: Sequence[str], folder: Path) -> int:

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
 import sys
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from pathlib import Path
 
 from tqdm import tqdm
 
+from ..errors import DamagedError
 from ..simulation.device import THREADS, all_cores
+from .parent import end_with_parent, for_child
 from .scene_run import SceneRun
 
 POLL = 1.0  # [s]
+MANY = 500  # runs; of more it would take too long to find how much work each is
+AT_ONCE = 256  # runs handed out: as many as any machine or cluster makes side by side
 
 
 def processes(jobs: int) -> Executor:
-    """Makes each run in a process of this machine, which share the cores."""
+    """Makes each run in a process of this machine, which share the cores and end with this one."""
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     threads = max(1, all_cores() // jobs)
-    return ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_begin, initargs=(threads,))
+    arguments = (threads, for_child())
+    return ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
 
 
 def make_missing(
     runs: Sequence[SceneRun], folder: Path, device: str | None, workers: Executor, quiet: bool
 ) -> dict[SceneRun, BaseException]:
-    """Make every run whose folder does not hold it yet, the longest first.
+    """Make every run whose folder does not hold it yet, the longest first where they are few enough to look.
 
     Args:
         runs: all runs; their names differ.
@@ -40,48 +46,85 @@ def make_missing(
 
     Returns: the runs that raised, and what; the others are made all the same.
     """
-    missing = sorted(
-        (run for run in runs if not run.done(folder / run.name)), key=lambda run: run.cost(), reverse=True
-    )
+    if not quiet and len(runs) > MANY:
+        print(f"{len(runs)} runs; looking for what is done already", flush=True)
+    missing, failed = _missing(runs, folder)
+    cost = dict.fromkeys(missing, 1.0)
+    if len(missing) <= MANY:
+        cost = {run: run.cost() for run in missing}
+        missing.sort(key=cost.get, reverse=True)
     if not quiet:
-        print(f"{len(runs)} runs, {len(runs) - len(missing)} of them done already, in {folder}/", flush=True)
-    begin, cost = clock.perf_counter(), {run: run.cost() for run in missing}
-    failed: dict[SceneRun, BaseException] = {}
+        done = len(runs) - len(missing) - len(failed)
+        print(f"{len(runs)} runs, {done} of them done already, in {folder}/", flush=True)
     show = not quiet and sys.stderr.isatty()
     form = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
     with tqdm(total=sum(cost.values()), disable=not show, leave=False, bar_format=form) as bar, workers:
-        pending = {workers.submit(run.make, folder / run.name, device): run for run in missing}
-        finished, ready = 0, 0.0
+        failed |= _Queue(missing, cost, folder, device, workers, bar, quiet).make()
+    return failed
+
+
+def _missing(runs: Sequence[SceneRun], folder: Path) -> tuple[list[SceneRun], dict[SceneRun, BaseException]]:
+    """The runs to make, and those whose folder can not be read, which stay as they are."""
+    there = set(os.listdir(folder)) if folder.is_dir() else set()
+    missing, unreadable = [], {}
+    for run in runs:
         try:
-            while pending:
-                for future in wait(pending, timeout=POLL if show else None, return_when=FIRST_COMPLETED).done:
-                    run = pending.pop(future)
-                    error = future.exception()
+            if run.name not in there or not run.done(folder / run.name):
+                missing.append(run)
+        except DamagedError as error:
+            unreadable[run] = error
+    return missing, unreadable
+
+
+class _Queue:
+    """Runs under way, and those that wait: a few more are handed out than can be made at once."""
+
+    def __init__(self, missing, cost, folder, device, workers, bar, quiet):
+        self._missing, self._cost, self._folder, self._device = missing, cost, folder, device
+        self._workers, self._bar, self._quiet = workers, bar, quiet
+        self._begin, self._finished, self._ready = clock.perf_counter(), 0, 0.0
+
+    def make(self) -> dict[SceneRun, BaseException]:
+        """Make all; the runs that raised, and what."""
+        waiting, pending, failed = iter(self._missing), {}, {}
+        try:
+            while True:
+                for run in itertools.islice(waiting, AT_ONCE - len(pending)):
+                    pending[self._workers.submit(run.make, self._folder / run.name, self._device)] = run
+                if not pending:
+                    return failed
+                timeout = None if self._bar.disable else POLL
+                for future in wait(pending, timeout=timeout, return_when=FIRST_COMPLETED).done:
+                    run, error = pending.pop(future), future.exception()
                     if error is not None:
                         failed[run] = error
-                    finished, ready = finished + 1, ready + cost[run]
-                    if not quiet:
-                        elapsed = clock.perf_counter() - begin
-                        reason = "" if error is None else f": {error}"
-                        bar.write(
-                            f"[{finished}/{len(missing)}] {run.name} ({elapsed:.0f} s){reason}", file=sys.stdout
-                        )
-                        sys.stdout.flush()
-                if show:
-                    running = [run for future, run in pending.items() if future.running()]
-                    part = sum(cost[run] * run.progress(folder / run.name) for run in running)
-                    bar.set_postfix_str(", ".join(run.name for run in running), refresh=False)
-                    bar.n = ready + part
-                    bar.refresh()
+                    self._say(run, error)
+                self._show([run for future, run in pending.items() if future.running()])
         except BaseException:  # an interrupt above all: what is done stays
             for future in pending:
                 future.cancel()
             for process in multiprocessing.active_children():
                 process.terminate()
             raise
-    return failed
+
+    def _say(self, run: SceneRun, error: BaseException | None) -> None:
+        self._finished, self._ready = self._finished + 1, self._ready + self._cost[run]
+        if not self._quiet:
+            elapsed, reason = clock.perf_counter() - self._begin, "" if error is None else f": {error}"
+            line = f"[{self._finished}/{len(self._missing)}] {run.name} ({elapsed:.0f} s){reason}"
+            self._bar.write(line, file=sys.stdout)
+            sys.stdout.flush()
+
+    def _show(self, running: Sequence[SceneRun]) -> None:
+        if not self._bar.disable:
+            part = sum(self._cost[run] * run.progress(self._folder / run.name) for run in running)
+            self._bar.set_postfix_str(", ".join(run.name for run in running), refresh=False)
+            self._bar.n = self._ready + part
+            self._bar.refresh()
 
 
-def _begin(threads: int) -> None:
+def _begin(threads: int, environment: Mapping[str, str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's business
     os.environ.setdefault(THREADS, str(threads))
+    os.environ.update(environment)
+    end_with_parent()

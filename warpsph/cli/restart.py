@@ -11,6 +11,7 @@ from pathlib import Path
 from ..simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, Interval
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
+from .run_folder import resume_command
 from .settings import Settings
 from .stopping import Stopper, handled
 
@@ -37,13 +38,6 @@ class Restart:
         """What the history had; None for a new run."""
         return None if self.checkpoint is None else self.checkpoint.history
 
-    def begin(self, simulation: Simulation, folder: Path) -> None:
-        """Bring the simulation to the checkpoint; a new run removes that of the run before it."""
-        if self.checkpoint is None:
-            (folder / CHECKPOINT).unlink(missing_ok=True)
-        else:
-            self.checkpoint.restore(simulation)
-
     @contextlib.contextmanager
     def watching(
         self, simulation: Simulation, history: History, folder: Path, settings: Settings
@@ -55,8 +49,9 @@ class Restart:
         if self.interval is None:
             yield _Nothing()
             return
-        checkpoints = Checkpoints(simulation, history, folder / CHECKPOINT, self.interval, settings.table())
-        stopper = Stopper(checkpoints, folder)
+        path, table = folder / CHECKPOINT, settings.table(folder)
+        checkpoints = Checkpoints(simulation, history, path, self.interval, table)
+        stopper = Stopper(checkpoints, resume_command(folder, settings.usd))
         with handled(stopper.ask):
             yield stopper
 
@@ -68,9 +63,10 @@ class _Nothing:
         """Nothing."""
 
 
-def settings_of(checkpoint: Checkpoint) -> Settings:
-    """How the run was made that left a checkpoint."""
+def settings_of(checkpoint: Checkpoint, folder: Path, usd: str | None = None) -> Settings:
+    """How the run was made that left a checkpoint in a folder; `usd` as in `Settings.read`."""
     header = checkpoint.header
     stretch = header["values"]["stretch"] or {}
     found = {"device": header["device"], "precision": header["precision"], "until": stretch.get("end")}
-    return Settings.read({name: value for name, value in (found | header["run"]).items() if value is not None})
+    table = {name: value for name, value in (found | header["run"]).items() if value is not None}
+    return Settings.read(table, folder, usd)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -12,24 +13,34 @@ from typing import Protocol
 
 from .. import __version__
 from ..errors import BreakdownError, SceneError, StoppedError
+from ..export.frame_files import read_about, times_of_frames
 from ..export.pictures.field import plot_field
 from ..export.pictures.history import plot_history
 from ..export.pictures.surface import plot_surface
 from ..scene.check import Check
-from ..scene.output import component
+from ..scene.output import Probe, component
 from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
 from ..simulation.summary import summarise
 from ..storage.files import write_json
+from ..storage.owner import owned, owned_file
+from ..validate import number
 from .catalogue import SceneFile
 from .progress import Progress
 from .restart import Restart
+from .run_folder import (
+    FIELD_PICTURE,
+    HISTORY,
+    HISTORY_PICTURE,
+    SUMMARY,
+    SURFACE_PICTURE,
+    check_free,
+    remove_results,
+    remove_run,
+)
 from .settings import Settings
 from .stored import StoredScene, store
-
-SUMMARY, HISTORY = "summary.json", "history.csv"
-HISTORY_PICTURE, FIELD_PICTURE, SURFACE_PICTURE = PICTURES = ("history.png", "field.png", "surface.png")
 
 
 class ClosingObserver(Observer, Protocol):
@@ -95,23 +106,45 @@ def run(
     folder: Path,
     *,
     quiet: bool,
+    overwrite: bool = False,
     watching: Sequence[Callable[[Simulation], ClosingObserver]] = (),
     restart: Restart | None = None,
 ) -> bool:
     """Run a scene and write its results into a folder; True when it finished and all checks passed.
 
-    `watching` makes further observers of the simulation; they are closed before the summary is written. `restart`
-    goes on from a checkpoint and writes new ones.
+    Args:
+        file: where the scene came from.
+        scene: the scene.
+        parameters: of the scene, name → value.
+        settings: how it is run.
+        folder: gets the results; nothing in it is touched before the run can begin.
+        quiet: whether to say nothing unless something fails.
+        overwrite: whether a former run in the folder may go.
+        watching: make further observers of the simulation; they are closed before the summary is written.
+        restart: goes on from a checkpoint and writes new ones.
 
     Raises:
+        SceneError: something is not allowed; a former run in the folder is then as it was.
         StoppedError: a signal asked the run to stop; summary and pictures show what there is.
     """
     say = (lambda text: None) if quiet else print
     restart = Restart() if restart is None else restart
+    stored = file.path if isinstance(file, StoredScene) else None
+    anew = restart.checkpoint is None
+    if anew:
+        check_free(folder, overwrite, stored)
     course = _prepare(file, scene, parameters, settings, folder, restart, say)
-    _advance(course, restart, watching, show=not quiet and sys.stderr.isatty())
-    summary = _judge(course)
-    pictures = _draw(course)
+    usd = course.settings.usd
+    with owned(folder), owned_file(Path(usd), "--usd") if usd else contextlib.nullcontext():
+        if anew:
+            check_free(folder, overwrite, stored)  # nobody can come in between any more
+            remove_run(folder, stored)
+        else:
+            remove_results(folder)
+        store(folder, file, scene, parameters, course.settings)
+        _advance(course, restart, watching, show=not quiet and sys.stderr.isatty())
+        summary = _judge(course)
+        pictures = _draw(course)
     _tell(course, summary, pictures, quiet, say)
     if course.stop is not None:
         raise course.stop
@@ -119,16 +152,22 @@ def run(
 
 
 def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
-    """The simulation where it begins, and a folder that is ready for its results."""
+    """The simulation where it begins; all that can be refused is refused here, before a file is touched."""
     start = clock.perf_counter()
     simulation = Simulation(scene, device=settings.device, precision=settings.precision, threads=settings.threads)
     settings = replace(settings, device=simulation.device.alias)
-    component("Output", simulation.field(scene.output.field), scene.output.component)  # refused now, not after it
-    folder = writable(folder)
-    restart.begin(simulation, folder)
-    for name in (SUMMARY, *PICTURES):
-        (folder / name).unlink(missing_ok=True)  # a former run's would be taken for this one's
-    store(folder, file, scene, parameters, settings)
+    component("Output", simulation.field(scene.output.field), scene.output.component)
+    _ = scene.probe_identities  # of the probes as they are before they are called
+    if restart.checkpoint is not None:
+        restart.checkpoint.restore(simulation)
+        about = read_about(folder)
+        _ = about and times_of_frames(folder, about)  # refused now, not when half of it is done
+    else:
+        with file.errors_located():
+            for probe in scene.output.probes:
+                _check_probe(probe, probe.function(simulation))
+    if settings.until is not None:
+        number("until", settings.until, at_least=simulation.time)
     where = simulation.device.alias + (f", {simulation.threads} threads" if simulation.threads > 1 else "")
     say(
         f"{scene.name}: {len(simulation.mesh.nodes)} nodes, {len(simulation.mesh.cells)} auxiliary nodes, "
@@ -138,6 +177,13 @@ def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
     if simulation.steps:
         say(f"goes on from step {simulation.steps}, t = {simulation.time:.6g} s")
     return Course(file, simulation, parameters, settings, folder)
+
+
+def _check_probe(probe: Probe, value: object) -> None:
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        raise SceneError(f"Probe({probe.name!r}).function", value, "it must return a number") from None
 
 
 def _advance(course: Course, restart: Restart, watching: Sequence[Callable], show: bool) -> None:
@@ -239,15 +285,3 @@ def table(checks: Sequence[Check]) -> str:
     return "\n".join(
         "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
     )
-
-
-def writable(folder: Path) -> Path:
-    """The folder, made if need be; refused when it can not be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".warpsph"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise SceneError("--out", str(folder), f"it must be a folder that can be written ({error})") from None
-    return folder

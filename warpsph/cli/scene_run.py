@@ -8,8 +8,11 @@ from pathlib import Path
 
 from .. import __version__
 from ..scene.scene import Scene
+from ..simulation.summary import read_summary
 from ..simulation.time_step import divide, time_step_limit
+from ..storage.reading import file_digest
 from .catalogue import SceneFile, load
+from .run_folder import HISTORY, SUMMARY
 
 OVERHEAD = 1000  # nodes whose work costs as much time as starting a step's kernels on a CPU
 
@@ -42,17 +45,19 @@ class SceneRun:
         """Whether the folder holds this run to its end, by this version, with these parameters.
 
         A run that broke down is done as well: it would break down again.
+
+        Raises:
+            DamagedError: its summary can not be read.
         """
-        try:
-            summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        if not (folder / SUMMARY).exists():
             return False
-        file, _, values = self.build()
+        summary, (file, _, values) = read_summary(folder / SUMMARY), self.build()
         return (
             not summary["stopped"]
             and summary["warpsph_version"] == __version__
             and summary["scene"] == file.name
             and summary["parameters"] == json.loads(json.dumps(values))
+            and summary["history"] == _digest(folder / HISTORY)
         )
 
     def make(self, folder: Path, device: str | None) -> None:
@@ -68,3 +73,8 @@ class SceneRun:
             return min(1.0, float(line.split(",")[1]) / self.build()[1].duration)
         except (OSError, ValueError, IndexError):
             return 0.0
+
+
+def _digest(path: Path) -> str | None:
+    """Of the history as it is; one that lacks its last rows does not belong to its summary."""
+    return file_digest(path) if path.is_file() else None

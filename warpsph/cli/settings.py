@@ -10,6 +10,10 @@ from pathlib import Path
 from ..device.precision import PRECISIONS
 from ..errors import SceneError, one_of
 from ..validate import index, instance, number
+from .run_folder import stage_in_data, stage_inside
+
+MOST_FRAMES = 999_999  # their files have six digits
+MOST_THREADS = 1024
 
 
 @dataclass(frozen=True)
@@ -35,8 +39,13 @@ class Settings:
     checkpoint_every: str = "10min"
 
     @classmethod
-    def read(cls, table: Mapping) -> Settings:
+    def read(cls, table: Mapping, folder: Path, usd: str | None = None) -> Settings:
         """From the table `[run]` of a stored scene or of a checkpoint.
+
+        Args:
+            table: the table.
+            folder: of the run.
+            usd: the stage that the user has named, so that the table's does not count.
 
         Raises:
             SceneError: an entry is not allowed.
@@ -50,15 +59,16 @@ class Settings:
         if "until" in table:
             number("run.until", table["until"], above=0.0)
         if "frames" in table:
-            index("run.frames", table["frames"])
+            index("run.frames", table["frames"], below=MOST_FRAMES + 1)
         if "threads" in table:
-            index("run.threads", table["threads"], at_least=1)
-        return cls(**table)
+            index("run.threads", table["threads"], at_least=1, below=MOST_THREADS + 1)
+        stage = usd or (stage_inside(folder, table["usd"]) if "usd" in table else None)
+        return cls(**{**table, "usd": stage})
 
-    def table(self) -> dict[str, object]:
-        """What `read` takes; what is None is left out."""
+    def table(self, folder: Path) -> dict[str, object]:
+        """What `read` takes, for the data in a run's folder; what is None is left out."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        values["usd"] = self.usd and str(Path(self.usd).absolute())  # the run may go on from another folder
+        values["usd"] = self.usd and stage_in_data(folder, self.usd)
         return {name: value for name, value in values.items() if value is not None}
 
 
@@ -92,7 +102,7 @@ def chosen(options: argparse.Namespace, before: Settings) -> Settings:
     given = {
         "device": options.device,
         "precision": options.precision,
-        "threads": None if options.threads is None else count("--threads", options.threads, at_least=1),
+        "threads": None if options.threads is None else count("--threads", options.threads, 1, MOST_THREADS),
         "until": None if options.until is None else _until(options.until),
         "frames": None if options.frames is None else count("--frames", options.frames),
         "usd": options.usd,
@@ -111,9 +121,10 @@ def _until(text: str) -> float:
         raise SceneError("--until", text, "it must be a number above 0 [s]") from None
 
 
-def count(option: str, text: str, at_least: int = 0) -> int:
+def count(option: str, text: str, at_least: int = 0, at_most: int = MOST_FRAMES) -> int:
     """A whole number."""
     try:
-        return index(option, int(text), at_least=at_least)
+        return index(option, int(text), at_least=at_least, below=at_most + 1)
     except ValueError:
-        raise SceneError(option, text, f"it must be a whole number, at least {at_least}") from None
+        allowed = f"it must be a whole number, at least {at_least} and at most {at_most}"
+        raise SceneError(option, text, allowed) from None

@@ -6,13 +6,13 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 from ..errors import StoppedError
 from ..simulation.checkpoint import Checkpoints
 from ..simulation.simulation import Simulation
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Ctrl-C, a request to end, a terminal that was closed.
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
 
 
 @contextlib.contextmanager
@@ -33,6 +33,18 @@ def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
             signal.signal(each, former)
 
 
+@contextlib.contextmanager
+def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Every signal that ends a process raises a `KeyboardInterrupt` meanwhile, after `tell` was called."""
+
+    def stop(number: int, frame: object) -> None:
+        tell()
+        raise KeyboardInterrupt
+
+    with handled(stop):
+        yield
+
+
 class Stopper:
     """An observer that writes the checkpoints, and ends the run with one when a signal asked for it.
 
@@ -40,11 +52,11 @@ class Stopper:
 
     Args:
         checkpoints: writes them.
-        folder: of the run.
+        again: the command that goes on from there.
     """
 
-    def __init__(self, checkpoints: Checkpoints, folder: Path):
-        self._checkpoints, self._folder, self._asked = checkpoints, folder, None
+    def __init__(self, checkpoints: Checkpoints, again: str):
+        self._checkpoints, self._again, self._asked = checkpoints, again, None
 
     @property
     def next_time(self) -> float:
@@ -63,7 +75,7 @@ class Stopper:
             self._checkpoints.observe(simulation)
             return
         written = self._checkpoints.write(simulation)
-        then = f"go on with: warpsph run --resume {self._folder}" if written else "without a checkpoint"
+        then = f"go on with: {self._again}" if written else "without a checkpoint"
         raise StoppedError(
             f"stopped after step {simulation.steps}, t = {simulation.time:.6g} s; {then}", self._asked
         )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,18 +24,15 @@ from ..scene.check import Check
 from ..scene.document import decode, encode
 from ..scene.parameter import assign
 from ..scene.scene import Scene
-from ..storage.files import write_whole
-from ..validate import instance
+from ..storage.files import write_text, write_whole
+from ..storage.names import name
+from ..storage.reading import check_array, file_digest, read_arrays, read_toml, reading
+from ..validate import flag, instance
 from .catalogue import SceneFile, load, load_file
+from .run_folder import ARRAYS, COPY, SCENE
 from .settings import Settings
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-SCENE, COPY = "scene.toml", "scene_file.py"
-CODE = ("file", "folder", "parameters", "sha256")
+CODE = ("file", "folder", "parameters", "sha256", "checks")
 NOTE = "# Repeat this run with: warpsph run {path}\n\n"
 
 
@@ -55,13 +51,12 @@ class StoredScene:
     @property
     def name(self) -> str:
         """Name of the scene."""
-        return self.document.get("name", self.path.stem)
+        return name("name", self.document.get("name", self.path.stem))
 
-    @property
-    def settings(self) -> Settings:
-        """How it was run."""
+    def run_settings(self, folder: Path, usd: str | None = None) -> Settings:
+        """How it was run; see `Settings.read`."""
         table = instance("run", self.document.get("run", {}), Mapping, "a table")
-        return Settings.read({name: value for name, value in table.items() if name != "warpsph"})
+        return Settings.read({key: value for key, value in table.items() if key != "warpsph"}, folder, usd)
 
     @property
     def _code(self) -> Mapping:
@@ -72,31 +67,46 @@ class StoredScene:
         return table
 
     @cached_property
-    def source(self) -> SceneFile | None:
-        """The scene file it came from; None when the data is all there is.
-
-        Raises:
-            SceneError: the file is gone or is no longer the one that was run.
-        """
+    def _file(self) -> Path | None:
+        """The scene file it came from, which lies beside the data and is the one that was run; None without."""
         code = self._code
         if not code:
             return None
-        path = self.path.parent / str(code.get("file"))
-        if not path.is_file():
-            raise SceneError("code.file", code.get("file"), f"it must be a scene file beside {self.path}")
-        if "sha256" in code and _sha256(path) != code["sha256"]:
+        file = instance("code.file", code.get("file"), str, "the name of a scene file beside the data")
+        path = self.path.parent / file
+        if Path(file).name != file or path.resolve().parent != self.path.parent.resolve() or not path.is_file():
+            raise SceneError("code.file", file, f"it must be the name of a scene file beside {self.path}")
+        if "sha256" not in code:
+            raise SceneError("code.file", file, "its sha256 must be given as well, of the file as it is to be run")
+        if file_digest(path) != code["sha256"]:
             raise SceneError("code.file", str(path), "it has changed since the run; its checks and probes count")
-        folder = Path(instance("code.folder", code.get("folder", "."), str, "a folder"))
-        return load_file(path, name=self.name, neighbours=self.path.parent / folder)
+        return path
+
+    @property
+    def _neighbours(self) -> Path:
+        return self.path.parent / instance("code.folder", self._code.get("folder", "."), str, "a folder")
+
+    @property
+    def origin(self) -> tuple[Path, Path, bool] | None:
+        """The scene file, the folder of the modules it may import, and whether it has checks; None without one."""
+        checks = bool(self._code.get("checks"))
+        return (self._file, self._neighbours.resolve(), checks) if self._file else None
 
     @cached_property
-    def _values(self) -> dict[str, object]:
-        given = self._code.get("parameters", {})
-        given = instance("code.parameters", given, Mapping, "a table")
-        return assign(self.source.parameters, [f"{k}={v}" for k, v in given.items()]) if self.source else {}
+    def source(self) -> SceneFile | None:
+        """The scene file it came from, which is executed now; None when the data is all there is."""
+        return load_file(self._file, name=self.name, neighbours=self._neighbours) if self._file else None
+
+    @property
+    def _given(self) -> Mapping[str, object]:
+        return instance("code.parameters", self._code.get("parameters", {}), Mapping, "a table")
 
     def build(self, settings: Sequence[str]) -> tuple[Scene, dict[str, object]]:
-        """The scene, and the values of the parameters it was made with."""
+        """The scene, and the values of its parameters; code runs only where the scene refers to it.
+
+        Raises:
+            SceneError: something in it is not allowed.
+        """
         if settings:
             raise SceneError(
                 "--set", settings[0], "a stored scene has no parameters: edit it, or run the scene file"
@@ -108,34 +118,33 @@ class StoredScene:
             if self.source is None:
                 raise SceneError(place, "code", "the file names no scene file in [code]")
             if not built:
-                built.append(self.source.build_from(self._values))
+                values = assign(self.source.parameters, [f"{k}={v}" for k, v in self._given.items()])
+                built.append(self.source.build_from(values))
             return built[0]
 
-        document, arrays = document | {"name": self.name}, self._arrays()
+        flag("code.checks", self._code.get("checks", False))
+        _ = self._file  # refused although it may not be needed
         try:
-            return decode(document, arrays, code), self._values
-        except SceneError:
-            if self.source is None:
-                raise
-        return decode(document, arrays, code), self._values  # the scene file, read now, may register what it names
+            scene = decode(document | {"name": self.name}, self._arrays(), code)
+        except RecursionError:
+            raise SceneError("scene", str(self.path), "it is nested too deep") from None
+        return scene, {name: None if value == "auto" else value for name, value in self._given.items()}
 
     def _arrays(self) -> dict[str, np.ndarray]:
         path = self.path.with_suffix(".npz")
-        if not path.is_file():
+        if not path.exists():
             return {}
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                return {name: file[name] for name in file.files}
-        except Exception as error:  # reading damaged bytes may raise anything
-            raise SceneError("scene", str(path), f"it is damaged ({error})") from None
+        arrays = read_arrays("scene", path, "it is damaged ({error})")
+        with reading("scene", path, "it is damaged ({error})"):
+            return {name: check_array(name, values, kind="biuf") for name, values in arrays.items()}
 
     def checks(self, run: SimpleNamespace) -> list[Check]:
-        """The checks of a finished run, if there is a scene file."""
-        return self.source.checks(run) if self.source else []
+        """The checks of a finished run, where the data say that its scene file has some."""
+        return self.source.checks(run) if self._code.get("checks") and self.source else []
 
     def errors_located(self) -> contextlib.AbstractContextManager:
         """Turns what the scene file's functions raise into a `SceneError`."""
-        return self.source.errors_located() if self.source else contextlib.nullcontext()
+        return self.source.errors_located() if "source" in vars(self) and self.source else contextlib.nullcontext()
 
 
 def open_scene(name: str) -> SceneFile | StoredScene:
@@ -145,17 +154,7 @@ def open_scene(name: str) -> SceneFile | StoredScene:
         SceneError: there is no such scene, or it can not be read.
     """
     path = Path(name)
-    if path.suffix != ".toml":
-        return load(name)
-    try:
-        return StoredScene(path, read_toml(path))
-    except (OSError, ValueError) as error:
-        raise SceneError("scene", name, f"it must be a readable TOML file ({error})") from None
-
-
-def read_toml(path: Path) -> dict:
-    """A TOML file as a dictionary; `OSError` or `ValueError` when it can not be read."""
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    return StoredScene(path, read_toml("scene", path)) if path.suffix == ".toml" else load(name)
 
 
 def store(
@@ -173,29 +172,20 @@ def store(
     if isinstance(file, StoredScene) and file.path.resolve() == (folder / SCENE).resolve():
         return  # it may be written by hand
     document, arrays = encode(scene)
-    document["run"] = replace(settings, usd=None).table() | {"warpsph": __version__}
-    source = file.source if isinstance(file, StoredScene) else file
-    if source is not None:
-        path = Path(source.module.__file__)
-        if isinstance(file, StoredScene):
-            neighbours = (file.path.parent / file.document["code"].get("folder", ".")).resolve()
-        else:
-            neighbours = path.parent
+    document["run"] = replace(settings, usd=None).table(folder) | {"warpsph": __version__}
+    if file.origin is not None:
+        path, neighbours, checks = file.origin
         content = path.read_bytes()
         write_whole(folder / COPY, lambda out: out.write(content))
         document["code"] = {
             "file": COPY,
             "folder": str(neighbours),
             "sha256": hashlib.sha256(content).hexdigest(),
+            "checks": checks,
             "parameters": {name: "auto" if value is None else value for name, value in values.items()},
         }
     if arrays:
-        write_whole(folder / "scene.npz", lambda out: np.savez(out, **arrays))
+        write_whole(folder / ARRAYS, lambda out: np.savez(out, **arrays))
     else:
-        (folder / "scene.npz").unlink(missing_ok=True)
-    text = NOTE.format(path=folder / SCENE) + tomli_w.dumps(document)
-    write_whole(folder / SCENE, lambda out: out.write(text.encode("utf-8")))
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+        (folder / ARRAYS).unlink(missing_ok=True)
+    write_text(folder / SCENE, NOTE.format(path=folder / SCENE) + tomli_w.dumps(document))

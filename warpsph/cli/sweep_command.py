@@ -12,10 +12,11 @@ from pathlib import Path
 from ..device.precision import precision as precision_of
 from ..errors import SceneError
 from ..simulation.device import THREADS, all_cores, choose_device, start_warp
+from ..storage.owner import owned
+from ..validate import index
 from .catalogue import load
 from .children import INTERRUPTED
-from .runner import writable
-from .settings import count
+from .settings import MOST_THREADS, count
 from .sweep import members, sweep, table
 
 
@@ -48,16 +49,15 @@ def add_parser(commands) -> None:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    if options.jobs < 1:
-        raise SceneError("--jobs", options.jobs, "it must be at least 1")
+    index("--jobs", options.jobs, at_least=1, below=MOST_THREADS + 1)
     precision_of(options.precision)
     start_warp()
     if options.device and not options.dask:
         choose_device(options.device)
     chosen = members(options.scene, options.set, options.precision, count("--frames", options.frames))
-    folder = writable(Path(options.out or Path("runs") / f"{load(options.scene).name}-sweep")).absolute()
+    folder = Path(options.out or Path("runs") / f"{load(options.scene).name}-sweep").absolute()
     try:
-        with _workers(options) as workers:
+        with owned(folder), _workers(options) as workers:
             rows = sweep(chosen, folder, options.device, workers, options.quiet)
     except KeyboardInterrupt:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)

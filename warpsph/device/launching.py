@@ -7,6 +7,7 @@ never scatter: what a thread writes no other one writes, and results do not depe
 A launch from Python costs 10 to 20 µs, one replayed from a recording 0.1 to 0.3 µs: below 10⁴ nodes that decides.
 """
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +15,8 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 import warp as wp
+
+from ..errors import SceneError
 
 # Fewer elements than this are not worth a second thread.
 SMALLEST_SHARE = 64
@@ -55,6 +58,7 @@ class Launcher:
 
     def __init__(self, device: wp.Device, threads: int = 1):
         self.device = device
+        self._process = os.getpid()
         self._helpers = tuple(range(1, threads if device.is_cpu else 1))
         self._pool = ThreadPoolExecutor(len(self._helpers)) if self._helpers else None
         self._recorded: list[list[_Launch]] | None = None
@@ -101,6 +105,11 @@ class Launcher:
 
     def _together(self, task: Callable[[int], None]) -> None:
         """Do a task on every thread, this one included, and wait for all."""
+        if self._helpers and os.getpid() != self._process:
+            allowed = (
+                "a forked process has no threads of its parent's; make the simulation there, or with threads=1"
+            )
+            raise SceneError("threads", self.threads, allowed)
         others = [self._pool.submit(task, thread) for thread in self._helpers]
         try:
             task(0)

@@ -171,13 +171,21 @@ def clear_after(run: Path, time: float) -> dict | None:
     """
     about = read_about(run)
     if about is not None:
-        mesh, _ = read_body(run, len(about["walls"]))
-        frames = [(path, read_frame(path, about["fields"], mesh)["time"]) for path in frame_paths(run)]
-        for path, own in frames:
-            if float(own) > time * (1.0 + ROUNDING):
+        for path, own in times_of_frames(run, about).items():
+            if own > time * (1.0 + ROUNDING):
                 path.unlink()
         remove_parts(run / FOLDER)
     return about
+
+
+def times_of_frames(run: Path, about: Mapping) -> dict[Path, float]:
+    """The time of every frame [s], by its file; all of each is read and checked.
+
+    Raises:
+        SceneError: one can not be read.
+    """
+    mesh, _ = read_body(run, len(about["walls"]))
+    return {path: float(read_frame(path, about["fields"], mesh)["time"]) for path in frame_paths(run)}
 
 
 def save_arrays(path: Path, arrays: Mapping[str, object]) -> None:

@@ -24,6 +24,22 @@ from .usd import ROOT, Drawing, check_written, usd_errors, write_stage
 CLIP = re.compile(r"\d+-\d{6}\.usdc")
 
 
+def clips_folder(path: Path) -> Path:
+    """Where the clips of a stage stand."""
+    return path.with_name(f"{path.name}.frames")
+
+
+def check_clips(path: Path) -> None:
+    """Refuse a stage beside which a folder of its clips' name holds anything else.
+
+    Raises:
+        SceneError: it does.
+    """
+    if not holds_only(clips_folder(path), CLIP):
+        allowed = f"{clips_folder(path)} holds what no run has written; choose another name"
+        raise SceneError("--usd", str(path), allowed)
+
+
 class LiveStage:
     """Keeps a USD file up to date with the frames of a run.
 
@@ -40,13 +56,11 @@ class LiveStage:
 
     def __init__(self, frames: Frames, path: Path):
         self._frames, self._path = frames, path
-        self._folder = path.with_name(f"{path.name}.frames")
+        self._folder = clips_folder(path)
         self._shown = quantity(None, frames)
         self._ranges: list[np.ndarray] = []
         self._seen: list[int] = []
-        if not holds_only(self._folder, CLIP):
-            allowed = f"{self._folder} holds what no run has written; choose another name"
-            raise SceneError("--usd", str(path), allowed)
+        check_clips(path)
         mark(self._folder)
         former = [path for path in self._folder.iterdir() if CLIP.fullmatch(path.name)]
         self._generation = 1 + max((int(path.name.partition("-")[0]) for path in former), default=0)

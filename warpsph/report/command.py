@@ -6,8 +6,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..cli.runner import writable
-from ..errors import SceneError, StoppedError
+from ..cli.settings import MOST_THREADS
+from ..cli.stopping import interrupting
+from ..storage.owner import owned
+from ..validate import index
 
 
 def add_parser(commands) -> None:
@@ -30,15 +32,12 @@ def add_parser(commands) -> None:
 def _report(options: argparse.Namespace) -> int:
     from .make import make_report  # all cases: slow to import
 
-    if options.jobs < 1:
-        raise SceneError("--jobs", options.jobs, "it must be at least 1")
+    index("--jobs", options.jobs, at_least=1, below=MOST_THREADS + 1)
     default = Path("runs") / ("report-quick" if options.quick else "report")
-    folder = writable(Path(options.out or default))
+    folder = Path(options.out or default)
     try:
-        make_report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
-    except StoppedError as stop:
-        print(f"warpsph: {stop}", file=sys.stderr)
-        return stop.status
+        with owned(folder), interrupting():
+            make_report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
     except KeyboardInterrupt:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
         return 130

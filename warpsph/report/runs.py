@@ -6,7 +6,6 @@ Reading back is what lets the report go on where it was interrupted, and be laid
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from ..export.frames import Frames, FrameWriter
 from ..mesh.mesh import Mesh
 from ..scene.scene import Scene
 from ..simulation.history import read_history
+from ..simulation.summary import read_summary
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class Run(SceneRun):
     def make(self, folder: Path, device: str | None) -> None:
         """Run it; what it prints goes into `log.txt`."""
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").unlink(missing_ok=True)
         file, scene, values = self.build()
         with (
             (folder / "log.txt").open("w", encoding="utf-8") as log,
@@ -64,6 +63,7 @@ class Run(SceneRun):
                     Settings(device=device, frames=len(self.frames)),
                     folder,
                     quiet=False,
+                    overwrite=True,
                     watching=[lambda simulation: FrameWriter(simulation, self.frames, folder)],
                 )
             except SceneError as error:  # its checks could not be evaluated: the run keeps its summary
@@ -72,7 +72,7 @@ class Run(SceneRun):
     def read(self, folder: Path) -> Result:
         """What it gave."""
         history, _ = read_history(folder / "history.csv")
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_summary(folder / "summary.json")
         return Result(self, folder, summary, history, Frames(folder))
 
 

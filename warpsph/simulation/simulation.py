@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..device.exclusive import exclusive
 from ..device.launching import Launcher
 from ..device.precision import precision as precision_of
 from ..errors import SceneError, one_of
@@ -42,7 +43,7 @@ class Observer(Protocol):
 
 
 class Simulation:
-    """Runs a scene.
+    """Runs a scene. Several may be in use, also in several threads, which take turns.
 
     Args:
         scene: the scene.
@@ -67,6 +68,7 @@ class Simulation:
         SceneError: the device, the precision or the time step is not allowed.
     """
 
+    @exclusive
     def __init__(
         self,
         scene: Scene,
@@ -142,6 +144,7 @@ class Simulation:
         times = [stretch.time_after(self.steps + k) for k in range(most + 1)]
         return times[: next((k for k in range(1, most) if times[k] >= due), most)]
 
+    @exclusive
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
         outcome = self.stepper.advance(times, dt, self._time_step.courant(dt))
@@ -154,6 +157,7 @@ class Simulation:
         if fault is not None:
             raise breakdown(self, fault, dt)
 
+    @exclusive
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:
         """All that the next steps depend on: arrays and numbers by name; see `restore`."""
         own = {name: getattr(self, name) for name in COUNTERS}
@@ -161,6 +165,7 @@ class Simulation:
         counted = {**own, "stretch": None if stretch is None else asdict(stretch)}
         return arrays(self.stepper), counted | {"stepper": numbers(self.stepper)}
 
+    @exclusive
     def restore(self, state: Mapping[str, np.ndarray], values: Mapping[str, object]) -> None:
         """Go back to what `state` gave, in this simulation or in another one of the same scene and precision.
 
@@ -172,6 +177,7 @@ class Simulation:
             setattr(self, name, values[name])
         self._time_step.stretch = None if values["stretch"] is None else Stretch(**values["stretch"])
 
+    @exclusive
     def field(self, name: str) -> np.ndarray:
         """A copy of a node field as a NumPy array; see `fields` for the names.
 

@@ -88,19 +88,26 @@ def _some(names: Iterable[str]) -> str:
 def _check(path: str, holding: list[Slot], new: np.ndarray) -> None:
     """Refuse an array that can not take the place of the one that is there."""
     now = holding[0].value.numpy()
-    grows = any(_in_list(slot) for slot in holding) and new.ndim == now.ndim == 1  # lists take more neighbours
+    grows = any(_is_list(slot.holder) for slot in holding) and new.ndim == 1  # it takes more neighbours
+    counts = any(hasattr(slot.holder, "_sources") for slot in holding)  # made anew with every list
     require(new.dtype == now.dtype, f"{path} is of type {new.dtype}")
     require(grows or new.shape == now.shape, f"{path} has shape {new.shape}")
     for part in [new] if new.dtype.names is None else [new[name] for name in new.dtype.names]:
         require(part.dtype.kind != "f" or bool(np.isfinite(part).all()), f"{path} is not finite everywhere")
     # What kernels find their way by is in the scene's tables, or from the start more than a flag.
-    if new.dtype.kind in "iu" and not grows and new.size and (np.ptp(now) > 1 or _in_table(holding)):
+    if (
+        new.dtype.kind in "iu"
+        and not grows
+        and not counts
+        and new.size
+        and (np.ptp(now) > 1 or _in_table(holding))
+    ):
         low, high = min(now.min(), 0), max(now.max(), 1)
         require(low <= new.min() and new.max() <= high, f"{path} leads out of its table")
 
 
-def _in_list(slot: Slot) -> bool:
-    return hasattr(slot.holder, "pairs") or {"start", "index"} <= vars(slot.holder).keys()
+def _is_list(holder: object) -> bool:
+    return {"start", "index"} <= vars(holder).keys()
 
 
 def _in_table(holding: list[Slot]) -> bool:
@@ -113,7 +120,7 @@ def _check_lists(root: object, saved: Mapping[str, np.ndarray], seats: Mapping[s
     path_of = {id(slot.value): path for path, holding in seats.items() for slot in holding}
     for slot in slots(root):
         sources = getattr(slot.holder, "_sources", None)
-        if slot.name != "pairs" or sources is None or slot.value.index is None:
+        if sources is None or not hasattr(slot.value, "__dict__") or not _is_list(slot.value):
             continue
         start, index = (saved[path_of[id(array)]] for array in (slot.value.start, slot.value.index))
         right = start.shape == slot.value.start.shape and not start[0] and (np.diff(start) >= 0).all()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import SceneError, WarpSPHError
+from ..errors import DamagedError, SceneError, WarpSPHError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -31,10 +31,10 @@ def reading(kind: str, path: Path, damaged: str = "it can not be read ({error})"
     except FileNotFoundError:
         raise SceneError(kind, str(path), "there is no such file") from None
     except MemoryError:
-        raise SceneError(kind, str(path), damaged.format(error="it is too large for the memory")) from None
+        raise DamagedError(kind, str(path), damaged.format(error="it is too large for the memory")) from None
     except Exception as error:  # reading damaged bytes may raise anything
         what = str(error) or type(error).__name__
-        raise SceneError(kind, str(path), damaged.format(error=what)) from None
+        raise DamagedError(kind, str(path), damaged.format(error=what)) from None
 
 
 def require(true: bool, what: str) -> None:
