@@ -27,8 +27,8 @@ from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..state.cells import CellStore, NodeCells, cell_store, corner_place
 
-# A cell with less than this share of the volume of a box with edges as long has folded: it has no frame, and its
-# modes are taken as they are.
+# A cell with less than this share of the volume of a box with edges as long has folded: it has no frame that sums
+# could follow, and ends a run whose nodes move.
 FOLDED = 0.05
 # Towards the corners of a cell n times as long as high the strain rate is taken by no more than 2.2/n, since
 # `corner_share` balances square cells: with more, waves in flat ones grow (tests/test_hard_cases.py).
@@ -85,16 +85,28 @@ def edges_function(space: Space, kind: CellKind) -> wp.Function:
 
 
 @cache
-def frame_function(space: Space) -> wp.Function:
-    """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
+def folded_function(space: Space) -> wp.Function:
+    """Edges ∂x/∂ξ_a of a cell in column a → whether it has folded."""
 
     @wp.func
-    def frame_of(edges: space.types.tensor):
+    def has_folded(edges: space.types.tensor):
         columns_of = wp.transpose(edges)
         box = space.real(1.0)
         for a in range(wp.static(space.dim)):
             box *= wp.length(columns_of[a])
-        if space.algebra.determinant(edges) <= space.real(FOLDED) * box:
+        return space.algebra.determinant(edges) <= space.real(FOLDED) * box
+
+    return has_folded
+
+
+@cache
+def frame_function(space: Space) -> wp.Function:
+    """Edges ∂x/∂ξ_a of a cell in column a → ∇ξ_a in row a; zero for a folded cell."""
+    has_folded = folded_function(space)
+
+    @wp.func
+    def frame_of(edges: space.types.tensor):
+        if has_folded(edges):
             return space.types.tensor()
         return space.algebra.inverse(edges)
 

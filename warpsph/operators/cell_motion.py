@@ -16,7 +16,7 @@ from ..physics.space import Space
 from ..state.body import Body
 from ..state.cells import NodeCells, corner_place
 from ..state.clock import FOLDED
-from .cell_means import edges_function
+from .cell_means import edges_function, folded_function
 from .motion import Motion
 from .spacing import Spacing
 
@@ -103,7 +103,8 @@ def _longest(space: Space) -> wp.Function:
 
 @cache
 def _measure_kernel(space: Space, kind: CellKind):
-    types, real, longest, edges_of = space.types, space.real, _longest(space), edges_function(space, kind)
+    types, real, longest = space.types, space.real, _longest(space)
+    edges_of, has_folded = edges_function(space, kind), folded_function(space)
     packed_nodes, packed_auxiliary = packed(types.MaterialNodes), packed(types.AuxiliaryNodes)
 
     @forward_kernel
@@ -133,10 +134,9 @@ def _measure_kernel(space: Space, kind: CellKind):
         auxiliary.smoothing_length[a] = h
         if support * wp.max(h - listed_h[a], real(0.0)) > half_skin:
             outdated[0] = 1
-        volume = space.algebra.determinant(edges)
-        if volume <= real(0.0):
+        if has_folded(edges):
             faults[FOLDED] = 1
-        volume = wp.max(volume, real(LEAST_VOLUME_SHARE) * initial_volume[a])
+        volume = wp.max(space.algebra.determinant(edges), real(LEAST_VOLUME_SHARE) * initial_volume[a])
         auxiliary.volume[a] = volume
         auxiliary.density[a] = mass[a] / volume
 

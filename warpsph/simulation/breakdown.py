@@ -35,8 +35,9 @@ def _non_finite(simulation, dt: float) -> tuple[str, int, str]:
 
 def _folded(simulation, dt: float) -> tuple[str, int, str]:
     mesh = simulation.mesh
-    volumes = mesh.with_nodes(simulation.field("position")).cell_volumes()
-    cell = int(np.argmin(volumes / mesh.cell_volumes()))
+    jacobians = mesh.with_nodes(simulation.field("position")).cell_jacobians()
+    boxes = np.linalg.norm(jacobians, axis=1).prod(axis=1)
+    cell = int(np.argmin(np.linalg.det(jacobians) / boxes))
     advice = "since a folded cell has no inside; material that is sheared by several cells needs larger ones"
     return f"cell {cell} folded, nodes {', '.join(map(str, mesh.cells[cell]))},", int(mesh.cells[cell, 0]), advice
 
