@@ -57,6 +57,11 @@ class CellKind:
         """Number of corners c."""
         return len(self.points)
 
+    @property
+    def grid(self) -> bool:
+        """Whether it is a cell of a grid, whose faces come in pairs, a low and a high one along each axis."""
+        return len(self.faces) == 2 * self.dim
+
     @cached_property
     def sides(self) -> np.ndarray:
         """2ξ − 1 of each corner, on a grid ±1, shape (c, d)."""

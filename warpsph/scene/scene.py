@@ -29,6 +29,7 @@ from .output import Output
 from .resolve import BoundaryTable, resolve
 from .selection import Bare
 from .shape import Shape
+from .thickness import check_thickness
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,9 @@ class Scene:
         scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
         self.output.check(self.mesh, self.duration)
-        _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
+        surface = self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else []
+        check_thickness(self.mesh, self.boundary, surface)
+        _ = self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
