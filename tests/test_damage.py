@@ -14,7 +14,6 @@ from warpsph.errors import DamagedError
 from warpsph.simulation.checkpoint import Checkpoint, write_checkpoint
 from warpsph.storage import reading
 
-
 TRIALS = [(25, 1), *(pytest.param(250, seed, marks=pytest.mark.long) for seed in range(2, 6))]
 
 

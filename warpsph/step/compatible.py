@@ -69,7 +69,7 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
         return 1.0
     theta = MARGIN * 0.5 * VELOCITY_SHARE
     undamped = (2.0 if dim == 2 else 1.5) * (1.0 - courant**2)
-    return min(1.0, max(0.0, undamped + theta / (4.0 * courant**2)))
+    return min(1.0, max(0.0, undamped + theta / max(4.0 * courant**2, SMALLEST)))
 
 
 class CompatibleFluxes:
