@@ -175,7 +175,9 @@ if __name__ == "__main__":
     if most >= 50:
         kinds += [kills.run, kills.plot, kills.sweep, kills.report]
     turn = 0
-    while sum(kills.count.values()) < most:
-        kinds[turn % len(kinds)]()
-        turn += 1
-    print(kills.count)
+    try:
+        while sum(kills.count.values()) < most:
+            kinds[turn % len(kinds)]()
+            turn += 1
+    finally:
+        print(kills.count, flush=True)
