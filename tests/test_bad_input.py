@@ -220,15 +220,20 @@ SELECTIONS = [
         lambda: scene(conditions=[Fixed(where(lambda x, y: x.top))]),
         "where",
         None,
-        "1 finite number.*attribute 'top'",
+        "True or False.*attribute 'top'",
     ),
     (
         lambda: scene(conditions=[Fixed(where(lambda x: x > 0))]),
         "where",
         None,
-        "1 finite number.*positional argument",
+        "True or False.*positional argument",
     ),
-    (lambda: scene(conditions=[Fixed(where(lambda x, y: x[:3] > 0))]), "where", None, "one value a node"),
+    (
+        lambda: scene(conditions=[Fixed(where(lambda x, y: x[:3] > 0))]),
+        "where",
+        None,
+        "an array of one of them a node",
+    ),
     (lambda: scene(conditions=[Fixed(where(3))]), "where", 3, "not callable"),
 ]
 CONDITIONS = [

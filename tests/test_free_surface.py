@@ -30,6 +30,7 @@ from warpsph import (
 from warpsph.device.launching import Launcher
 from warpsph.operators.conditions import Conditions
 from warpsph.operators.surface.scan import SurfaceScan
+from warpsph.physics.space import Space
 
 ELASTIC = Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0)
 # Exact to round-off: in float32 a position carries 1e-6 of a spacing, and a direction to the next node as much; in
@@ -42,6 +43,19 @@ def simulation_of(shape, device, precision, normals="improved", **options):
     fields = {"material": ELASTIC, "duration": 1.0} | options
     scene = Scene(shape=shape, free_surface=FreeSurface(normals=normals), **fields)
     return Simulation(scene, device=device, precision=precision)
+
+
+def scan_of(simulation, candidates):
+    """A scan of its own among some nodes."""
+    space, launcher = Space(simulation.mesh.continuum, simulation.precision), Launcher(simulation.device)
+    return SurfaceScan(simulation.scene, candidates, nodes=simulation.nodes, space=space, launcher=launcher)
+
+
+def counted_searches(simulation):
+    """A list that gets the number of steps made whenever the surface is sought from now on."""
+    searches, refresh = [], simulation.conditions.refresh
+    simulation.conditions.refresh = lambda: (searches.append(simulation.steps), refresh())
+    return searches
 
 
 def numerics_of(scheme):
@@ -251,10 +265,8 @@ def test_scan_alone_tells_inside_from_surface(device, precision, name):
     """
     simulation = simulation_of(BODIES[name]().shape, device, precision)
     everyone = np.arange(len(simulation.mesh.nodes))
-    scan = SurfaceScan(
-        simulation.scene, everyone, simulation.nodes, simulation.precision, Launcher(simulation.device)
-    )
-    scan.find(simulation.nodes)
+    scan = scan_of(simulation, everyone)
+    scan.refresh()
     assert np.array_equal(scan.candidates.exposed.numpy() == 1, on_boundary(simulation.mesh))
 
 
@@ -315,7 +327,7 @@ def test_candidates_end_at_the_walls():
     """The free edges with their ends, which lie on walls as well; no other node of a wall."""
     walls = [Roller(edge("left")), Fixed(edge("bottom"))]
     scene = plane(conditions=walls, free_surface=FreeSurface())
-    candidates = scene.free_surface.candidates(scene.mesh, scene.boundary)
+    candidates = scene.free_surface.candidates(scene.mesh, scene.conditions)
     x = scene.mesh.nodes
     assert candidates.tolist() == np.flatnonzero(np.isclose(x, 1.0).any(axis=1)).tolist()
 
@@ -445,16 +457,15 @@ def test_normals_follow_a_rotation(device, precision):
     x0 = simulation.mesh.nodes
     right = np.flatnonzero(np.isclose(x0[:, 0], 0.2) & (np.abs(x0[:, 1]) < 0.15))
     rim = np.flatnonzero(simulation.field("free_surface"))
-    fresh = SurfaceScan(simulation.scene, rim, simulation.nodes, simulation.precision, Launcher(simulation.device))
-    searches, locate = [], simulation.conditions.locate
-    simulation.conditions.locate = lambda nodes: (searches.append(simulation.steps), locate(nodes))
+    fresh = scan_of(simulation, rim)
+    searches = counted_searches(simulation)
     turned, steps = 0.0, 0
     while turned < np.deg2rad(20.0):
         simulation.step()
         steps += 1
         x = simulation.field("position").astype(float)
         turned = np.arctan2((x0[:, 0] * x[:, 1] - x0[:, 1] * x[:, 0]).sum(), (x0 * x).sum())
-        fresh.find(simulation.nodes)
+        fresh.refresh()
         present = fresh.candidates.normal.numpy()[np.searchsorted(rim, right)]
         assert angles(simulation.field("surface_normal")[right], present).max() <= np.deg2rad(1.0)
     assert 20 <= len(searches) <= 36 < steps
@@ -463,8 +474,7 @@ def test_normals_follow_a_rotation(device, precision):
 def test_new_pair_lists_find_the_surface_anew(device):
     """Also where nothing turns, as in a translation: parts of a body may have come close to each other."""
     simulation = Simulation(plane(free_surface=FreeSurface(), velocity=lambda x, y: (20.0, 0.0)), device=device)
-    searches, locate = [], simulation.conditions.locate
-    simulation.conditions.locate = lambda nodes: (searches.append(simulation.steps), locate(nodes))
+    searches = counted_searches(simulation)
     before = simulation.list_builds
     while simulation.list_builds < before + 3:
         simulation.step()

@@ -63,11 +63,11 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
     first, restored = (Simulation(scene, device, precision) for _ in range(2))
     first.run(0.05)
     restored.restore(*first.state())
-    told_of = ("nodes.", "auxiliary.", "_around", "_motion._of_node", "_fluxes._cells")
+    told_of = ("body.nodes.", "body.auxiliary.", "body.node_cells.", "lists.around", "fluxes._cells")
     every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}
     assert len(arrays) > 20
     for path, array in arrays.items():
-        cells_together = path.endswith("numbers") and array.device.is_cpu
+        cells_together = path == "fluxes._cells" and array.device.is_cpu
         assert array.ptr % ALIGNMENT == 0, path
         assert (array.transpose() if cells_together else array).is_contiguous, path

@@ -307,7 +307,7 @@ def test_mapped_edges_keep_the_names_of_the_unmapped_shape():
 
 def test_longest_and_shortest_distances_of_a_stretched_cell():
     mesh = Box((1.0, 1.0), 0.5).mapped(lambda x, y: (2.0 * x, 0.5 * y)).mesh()
-    assert (mesh.largest_edge(), mesh.smallest_edge()) == pytest.approx((1.0, 0.25), rel=1e-12)
+    assert (mesh.largest_edge(), mesh.smallest_distance()) == pytest.approx((1.0, 0.25), rel=1e-12)
 
 
 @every_shape

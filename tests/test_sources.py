@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from tests.law_tester import LawTester
 from warpsph import BodyForce, Box, Elastic, Fixed, Numerics, PerzynaVonMises, Scene, Simulation, everywhere
 from warpsph.device.linear_algebra import rotation_of
 from warpsph.device.precision import PRECISIONS
@@ -152,6 +153,24 @@ def test_analytic_flow_bears_any_fluidity_and_exponent(precision, fluidity, expo
     assert (q >= size * (1 - slack)).all()
     if fluidity == 1e9 and exponent == 1.0:
         np.testing.assert_allclose(q, size, rtol=slack)
+
+
+@pytest.mark.parametrize("hardening", [-2e7, 0.0, 3e7])
+def test_a_path_of_strains_at_high_fluidity_is_rate_independent_plasticity(hardening):
+    """Shear γ up and back: q = √3 G γ up to Y0, then Y0 + H ε̄, ε̄ = (√3 G γ − Y0)/(3G + H); elastic back."""
+    material = PerzynaVonMises(
+        young_modulus=8e7, poisson_ratio=0.3, density=2000.0, fluidity=1e12, yield_size=1e5, hardening=hardening
+    )
+    steps, shear = 40, material.shear_modulus
+    increments = np.zeros((steps + 10, 4))
+    increments[:steps, 2], increments[steps:, 2] = 1e-4, -1e-4
+    stress, internals = LawTester(material, 2).follow(increments, 1e-3)
+    trial = np.sqrt(3.0) * shear * 1e-4 * np.arange(1, steps + 1)
+    eps = np.maximum(trial - 1e5, 0.0) / (3.0 * shear + hardening)
+    q = np.minimum(trial, 1e5 + hardening * eps)
+    back = q[-1] - np.sqrt(3.0) * shear * 1e-4 * np.arange(1, 11)
+    np.testing.assert_allclose(np.sqrt(3.0) * stress[:, 2], [*q, *back], rtol=1e-9)
+    np.testing.assert_allclose(internals[:, 0], [*eps, *[eps[-1]] * 10], rtol=1e-9)
 
 
 def test_analytic_sources_do_not_limit_the_time_step():

@@ -19,6 +19,7 @@ from pathlib import Path
 from warpsph.cli.main import _parser
 from warpsph.materials import Elastic, PerzynaVonMises
 from warpsph.scene.parameter import numerical_parameters
+from warpsph.scene.scheme import SCHEMES
 from warpsph.simulation.fields import FIELDS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -64,6 +65,16 @@ def material_fields(material: type) -> str:
     return table(("field", "unit", "meaning"), rows)
 
 
+def schemes() -> str:
+    """The schemes, and what a scene must know of each."""
+    rows = []
+    for scheme in SCHEMES.values():
+        free = "free" if scheme.unloads else "keeps its traction"
+        kinds = ", ".join(kind.name for kind in scheme.kinds)
+        rows.append((f"`{scheme.name}`", scheme.meaning, free, kinds))
+    return table(("scheme", "meaning", "an edge without a condition", "cells"), rows)
+
+
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The commands by name."""
     (subparsers,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -85,6 +96,7 @@ def options(command: argparse.ArgumentParser) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "numerics": numerics,
     "fields": fields,
+    "schemes": schemes,
     **{f"parameters of {kind.__name__}": partial(parameters, kind) for kind in (Elastic, PerzynaVonMises)},
     "fields of PerzynaVonMises": partial(material_fields, PerzynaVonMises),
     **{f"options of {name}": partial(options, command) for name, command in commands().items()},

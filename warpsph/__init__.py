@@ -19,7 +19,7 @@ A scene is built from named parts and run by a `Simulation`:
 __version__ = "0.1.0"
 
 from . import analysis, frames
-from .errors import NonFiniteError, SceneError, WarpSPHError
+from .errors import BreakdownError, NonFiniteError, SceneError, WarpSPHError
 from .materials import Elastic, Material, PerzynaVonMises
 from .scene import (
     PUBLISHED,
@@ -61,6 +61,7 @@ __all__ = [
     "PUBLISHED",
     "BodyForce",
     "Box",
+    "BreakdownError",
     "Check",
     "Checkpoint",
     "Disc",

@@ -28,22 +28,32 @@ class DamagedError(SceneError):
     """A file that a run has left can not be read: it is there, and nobody may act as if it were not."""
 
 
-class NonFiniteError(WarpSPHError, ArithmeticError):
-    """A field became NaN or infinite during a run.
+class BreakdownError(WarpSPHError, ArithmeticError):
+    """A run came to something that can not be true, and ended there; what was recorded before stays.
 
-    Attributes:
+    Args:
+        what: what was seen.
         step: number of the step that produced it.
         time: simulated time at the end of that step [s].
-        node: index of one material node where it was seen.
+        node: index of a material node where it was seen.
+        position: the node's initial place [m].
+        advice: what may have led there.
+
+    Attributes:
+        step, time, node: as given.
     """
 
-    def __init__(self, step: int, time: float, node: int, position: Iterable[float]):
+    def __init__(self, what: str, *, step: int, time: float, node: int, position: Iterable[float], advice: str):
         self.step, self.time, self.node = step, time, node
         at = ", ".join(f"{x:.6g}" for x in position)
         super().__init__(
-            f"velocity, stress or displacement became non-finite in step {step} (t = {time:.6g} s) at node "
-            f"{node}, initially at ({at}) m: the state can not be advanced; try a smaller courant number"
+            f"{what} in step {step} (t = {time:.6g} s) at node {node}, initially at ({at}) m: the run ends here, "
+            f"{advice}"
         )
+
+
+class NonFiniteError(BreakdownError):
+    """A field became NaN or infinite during a run."""
 
 
 class StoppedError(WarpSPHError):

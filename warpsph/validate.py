@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from numbers import Integral, Real
 
 import numpy as np
@@ -105,6 +106,39 @@ def listed(field: str, value: object, kind: type, allowed: str) -> tuple:
     return parts
 
 
+@dataclass(frozen=True, repr=False)
+class FunctionOfTime:
+    """A function of time in a field of a scene: f(t) is a finite number, or an error names field and time.
+
+    Args:
+        field: name of the field.
+        function: f(t), t in [s].
+    """
+
+    field: str
+    function: Callable[[float], float]
+
+    def __call__(self, t: float) -> float:
+        try:
+            value = self.function(t)
+        except Exception as error:  # a user's function may raise anything
+            said = f"it raised {type(error).__name__}: {error}"
+            raise self._refusal(t, said) from error
+        if type(value) is float and math.isfinite(value):
+            return value
+        real = _real(value)
+        if not math.isfinite(real):
+            raise self._refusal(t, f"not {value!r}")
+        return real
+
+    def _refusal(self, t: float, said: str) -> SceneError:
+        rounded = float(f"{t:.6g}")
+        return SceneError(self.field, self.function, f"f({rounded}) must return a finite number; {said}")
+
+    def __repr__(self) -> str:
+        return repr(self.function)
+
+
 def time_function(field: str, value: object) -> TimeFunction:
     """A number, or a function of time [s] that returns a finite number; tried once at t = 0."""
     if not callable(value):
@@ -112,11 +146,9 @@ def time_function(field: str, value: object) -> TimeFunction:
             return number(field, value)
         except SceneError:
             raise SceneError(field, value, "it must be a finite number or a function of time f(t)") from None
-    try:
-        number(field, value(0.0))
-    except Exception as error:  # a user's function may raise anything
-        raise SceneError(field, value, f"f(0.0) must return a finite number ({error})") from error
-    return value
+    function = FunctionOfTime(field, value.function if isinstance(value, FunctionOfTime) else value)
+    function(0.0)
+    return function
 
 
 def instance(field: str, value: object, kind: type | tuple[type, ...], allowed: str) -> object:
@@ -138,10 +170,30 @@ def field_of_position(field: str, function: Callable, points: np.ndarray, size: 
             parts = (np.reshape(parts, -1) if np.ndim(parts) else parts,)
         if len(parts) != size:
             raise ValueError(f"it returned {len(parts)} parts")
-        columns = [np.broadcast_to(np.asarray(part, dtype=float), len(points)) for part in parts]
+        columns = [np.broadcast_to(_reals(part), len(points)) for part in parts]
     except Exception as error:  # a user's function may raise anything
         raise SceneError(field, function, f"{allowed} ({error})") from error
     values = np.stack(columns, axis=1)
     if not np.isfinite(values).all():
         raise SceneError(field, function, allowed)
     return values
+
+
+def _reals(part: object) -> np.ndarray:
+    values = np.asarray(part)
+    if values.dtype.kind not in "iuf":
+        raise ValueError(f"it returned {values.dtype.name} values")
+    return values.astype(float)
+
+
+def mask_of_position(field: str, function: Callable, points: np.ndarray) -> np.ndarray:
+    """Where a user's function of position is true, boolean (n,); called as `field_of_position` calls it."""
+    allowed = "f(x, …) must return True or False, or an array of one of them a node, as a comparison does"
+    try:
+        values = np.asarray(function(*points.T))
+        mask = np.broadcast_to(values, len(points))
+    except Exception as error:  # a user's function may raise anything
+        raise SceneError(field, function, f"{allowed} ({error})") from error
+    if values.dtype != bool:
+        raise SceneError(field, function, f"{allowed}, not {values.dtype.name} values")
+    return mask

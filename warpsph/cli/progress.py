@@ -1,4 +1,4 @@
-"""The progress bar of a run: simulated time, step rate, remaining time."""
+"""The progress bar of a run on a terminal: simulated time, step rate, remaining time."""
 
 from __future__ import annotations
 

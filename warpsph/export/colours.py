@@ -1,4 +1,8 @@
-"""Colours of a quantity: a colour map over a span of values that hides no detail behind single outliers."""
+"""Colours of a quantity: a colour map, and the span of values it stands for.
+
+Single nodes at a singularity, a footing's edge above all, have values far beyond all others. The span leaves them
+out, and the colour bar says that there is something beyond.
+"""
 
 from __future__ import annotations
 

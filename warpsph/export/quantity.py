@@ -1,4 +1,7 @@
-"""A number a node to be drawn: a scalar field, a component, or the length of a vector field."""
+"""A number a node, to be drawn: a scalar field, one component of a field, or the length of a vector field.
+
+Pictures, USD colours and the command line (`--field velocity:y`) name what they show in this one way.
+"""
 
 from __future__ import annotations
 

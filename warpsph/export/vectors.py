@@ -1,4 +1,4 @@
-"""What every writer of files needs."""
+"""Vectors as file formats want them: with three components, whatever the body has."""
 
 from __future__ import annotations
 

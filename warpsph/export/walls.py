@@ -1,4 +1,7 @@
-"""What surrounds a body, to be drawn: the boundary faces that conditions hold or move, as boxes or quads."""
+"""What surrounds a body, to be drawn: the boundary faces that conditions hold or move, as boxes or quads.
+
+A condition acts on nodes and has no shape; a viewer shows why the body does not fall by the faces it acts on.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.mesh import Mesh
+from ..mesh.mesh import NO_SIDE, Mesh
 from ..scene.condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from ..scene.scene import Scene
 
@@ -20,7 +23,7 @@ class Wall:
 
     Attributes:
         name: kind of the condition and the edges it is on, e.g. `roller_left`.
-        faces: indices of the boundary faces of the lattice, shape (k,).
+        faces: indices of the boundary faces of the mesh, shape (k,).
         still: whether it never moves.
     """
 
@@ -41,8 +44,10 @@ def walls_of(scene: Scene) -> tuple[Wall, ...]:
 
 
 def _name(condition: Condition, mesh: Mesh, faces: np.ndarray) -> str:
-    sides = [mesh.continuum.edges[side] for side in np.unique(mesh.face_side[faces])]
-    return "_".join([KINDS.get(type(condition), "held"), *(sides if len(sides) < len(KINDS) else ["edge"])])
+    sides = np.unique(mesh.face_side[faces]).tolist()
+    named = NO_SIDE not in sides and len(sides) < len(KINDS)
+    names = [mesh.continuum.edges[side] for side in sides] if named else ["edge"]
+    return "_".join([KINDS.get(type(condition), "held"), *names])
 
 
 def _unused(name: str, taken: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import SceneError
 from .kinds import GRID_KINDS
-from .mesh import Mesh
+from .mesh import NO_SIDE, Mesh
 
 
 def hinges(kept: np.ndarray) -> np.ndarray:
@@ -69,9 +69,10 @@ def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.
             neighbour[:, axis] += 1 if high else -1
             bare = np.flatnonzero(~padded[tuple(neighbour.T)])
             side = 2 * axis + high
+            place = index[:, axis]
             faces.append(cells[bare][:, kind.faces[side]])
             face_cell.append(bare)
-            face_side.append(np.full(len(bare), side))
+            face_side.append(np.where(place[bare] == (place.max() if high else place.min()), side, NO_SIDE))
     return Mesh(
         spacing=spacing,
         nodes=nodes,

@@ -11,6 +11,8 @@ from ..errors import SceneError, one_of
 from .continuum import CONTINUA, Continuum
 from .kinds import KINDS, CellKind
 
+NO_SIDE = -1
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -22,7 +24,8 @@ class Mesh:
         cells: node indices of each cell in the order of its kind's corners, shape (m, c).
         faces: node indices of each boundary face, in the order of the face's kind, shape (f, …).
         face_cell: the cell each face belongs to, shape (f,).
-        face_side: 2·axis for the low side of an axis of the grid, 2·axis + 1 for the high side, shape (f,).
+        face_side: 2·axis where the grid ends at the low side of an axis, 2·axis + 1 at the high side, `NO_SIDE` at
+            steps, notches and holes in between, shape (f,).
     """
 
     spacing: float
@@ -54,6 +57,11 @@ class Mesh:
             known = one_of(f"{kind.name} ({kind.dim}D, {kind.corners})" for kind in KINDS.values())
             raise SceneError("cells", f"{corners} corners in {self.dim}D", known)
         return KINDS[self.dim, corners]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """The middle of the box that holds it [m], shape (d,)."""
+        return 0.5 * (self.nodes.min(axis=0) + self.nodes.max(axis=0))
 
     def with_nodes(self, nodes: np.ndarray) -> Mesh:
         """The same mesh with its nodes elsewhere."""
@@ -103,9 +111,12 @@ class Mesh:
         corners = self.nodes[self.cells]
         return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
 
-    def smallest_edge(self) -> float:
-        """Shortest distance across a cell between the middles of opposite faces [m]."""
-        return float(np.linalg.norm(self.cell_jacobians(), axis=1).min())
+    def smallest_distance(self) -> float:
+        """Least distance across a cell [m]: the least singular value of its edges, which a wave sees.
+
+        In a cell that leans it is less than the distance between the middles of opposite faces.
+        """
+        return float(np.linalg.svd(self.cell_jacobians(), compute_uv=False).min())
 
     def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.

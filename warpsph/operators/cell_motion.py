@@ -15,11 +15,12 @@ from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..state.body import Body
 from ..state.cells import NodeCells, corner_place
-from .cell_means import edges_function
+from ..state.clock import FOLDED
+from .cell_means import edges_function, folded_function
 from .motion import Motion
 from .spacing import Spacing
 
-# A cell that folds keeps this share of its initial volume: a density must stay positive.
+# A cell that is pressed flat keeps this share of its initial volume: a density must stay positive.
 LEAST_VOLUME_SHARE = 0.1
 
 
@@ -27,11 +28,11 @@ class CellMotion(Motion):
     """Moves the nodes with v^{n+1/2}; volumes, densities and smoothing lengths follow from the cells.
 
     Args:
-        body, skin, outdated: as for `Motion`.
+        body, skin, outdated, faults: as for `Motion`.
     """
 
-    def __init__(self, body: Body, *, skin: float, outdated: wp.array):
-        super().__init__(body, skin=skin, outdated=outdated)
+    def __init__(self, body: Body, *, skin: float, outdated: wp.array, faults: wp.array):
+        super().__init__(body, skin=skin, outdated=outdated, faults=faults)
         space, device = body.space, body.launcher.device
         volume = body.scene.mesh.cell_volumes().astype(space.precision.dtype)
         mass = space.precision.dtype(body.scene.material.density) * volume
@@ -59,7 +60,7 @@ class CellMotion(Motion):
         nodes, auxiliary, launch = self._body.nodes, self._body.auxiliary, self._body.launcher.launch
         launch(self._shift, nodes.point, [dt, nodes], gathers=False)
         inputs = [self._mass, self._initial_volume, self._ratio, self._support, 0.5 * self._skin]
-        inputs += [self._cell_h, nodes, auxiliary, self._outdated]
+        inputs += [self._cell_h, nodes, auxiliary, self._outdated, self._faults]
         launch(self._measure, auxiliary.point, inputs)
         inputs = [self._support, 0.5 * self._skin, self._listed, self._listed_h, self._body.node_cells]
         inputs += [auxiliary, nodes, self._outdated]
@@ -102,7 +103,8 @@ def _longest(space: Space) -> wp.Function:
 
 @cache
 def _measure_kernel(space: Space, kind: CellKind):
-    types, real, longest, edges_of = space.types, space.real, _longest(space), edges_function(space, kind)
+    types, real, longest = space.types, space.real, _longest(space)
+    edges_of, has_folded = edges_function(space, kind), folded_function(space)
     packed_nodes, packed_auxiliary = packed(types.MaterialNodes), packed(types.AuxiliaryNodes)
 
     @forward_kernel
@@ -117,6 +119,7 @@ def _measure_kernel(space: Space, kind: CellKind):
         nodes: types.MaterialNodes,
         auxiliary: types.AuxiliaryNodes,
         outdated: wp.array(dtype=wp.int32),
+        faults: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
         packed_nodes(nodes)
@@ -131,6 +134,8 @@ def _measure_kernel(space: Space, kind: CellKind):
         auxiliary.smoothing_length[a] = h
         if support * wp.max(h - listed_h[a], real(0.0)) > half_skin:
             outdated[0] = 1
+        if has_folded(edges):
+            faults[FOLDED] = 1
         volume = wp.max(space.algebra.determinant(edges), real(LEAST_VOLUME_SHARE) * initial_volume[a])
         auxiliary.volume[a] = volume
         auxiliary.density[a] = mass[a] / volume

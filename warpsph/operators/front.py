@@ -35,7 +35,8 @@ def front_pressure(space: Space, kind: CellKind) -> wp.Function:
     ):
         mean, largest, per_width2 = real(0.0), wp.abs(rate), real(0.0)
         for k in range(wp.static(kind.corners)):
-            own = wp.trace(nodes.velocity_gradient[auxiliary.cell[a, k]])
+            i = auxiliary.cell[a, k]
+            own = wp.trace(nodes.velocity_gradient[i])
             mean += own / real(wp.static(kind.corners))
             largest = wp.max(largest, wp.abs(own))
         for b in range(wp.static(space.dim)):

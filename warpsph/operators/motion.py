@@ -6,7 +6,6 @@ rigid rotation Ω strains a body by −Ω² Δt/2 in every direction, an error o
 −π Ω Δt a turn; with it L is skew, and errors are of second order (Hughes and Winget 1980).
 """
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -18,14 +17,21 @@ from ..physics.space import Space
 from ..state.body import Body
 
 
-@dataclass(frozen=True)
-class NoMotion:
-    """Small displacements: the initial configuration is kept."""
+class SmallMotion:
+    """Small displacements: they add up, but the initial configuration is kept for all sums.
 
-    kernels: tuple[wp.Kernel, ...] = ()
+    Args:
+        body: the body.
+    """
+
+    def __init__(self, body: Body):
+        self._body, self._displace = body, _displace_kernel(body.space)
+        self.kernels = (self._displace,)
 
     def move(self, dt: wp.array) -> None:
-        """Nothing."""
+        """u ← u + Δt v^{n+1/2}."""
+        nodes = self._body.nodes
+        self._body.launcher.launch(self._displace, nodes.point, [dt, nodes], gathers=False)
 
     def mark(self) -> None:
         """Nothing."""
@@ -42,11 +48,12 @@ class Motion:
         body: the body, whose auxiliary nodes have been centred.
         skin: skin of the pair lists [m].
         outdated: one integer, set once some node has used up its half of the skin since `mark`.
+        faults: where kernels note what can not be true; cells that fold where they are measured.
     """
 
-    def __init__(self, body: Body, *, skin: float, outdated: wp.array):
+    def __init__(self, body: Body, *, skin: float, outdated: wp.array, faults: wp.array):
         space, nodes = body.space, body.nodes
-        self._body, self._skin, self._outdated = body, skin, outdated
+        self._body, self._skin, self._outdated, self._faults = body, skin, outdated, faults
         self._support = body.scene.numerics.smoothing.support
         self._reference_density = body.scene.material.density
         self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
@@ -71,6 +78,16 @@ class Motion:
         inputs += [self._listed, self._listed_h, nodes, self._outdated]
         launch(self._move, nodes.point, inputs, gathers=False)
         launch(self._centre, auxiliary.point, [nodes, auxiliary])
+
+
+@cache
+def _displace_kernel(space: Space):
+    @forward_kernel
+    def displace(first: int, dt: wp.array(dtype=space.real), nodes: space.types.MaterialNodes):
+        i = first + wp.tid()
+        nodes.displacement[i] = nodes.displacement[i] + dt[0] * nodes.half_velocity[i]
+
+    return displace
 
 
 @cache

@@ -1,10 +1,13 @@
 """The source part L(Δt/2) of steps 1-2 and 11-12: viscoplastic flow, spin, body force and damping at the nodes.
 
-The velocity's sources (b − c v) and the stress's (flow, spin) do not touch each other, so each is integrated on
-its own: the velocity's by the classical fourth-order Runge-Kutta scheme, the stress's by the scheme of choice:
+The velocity's sources (b − c v) and the stress's (flow, spin) do not touch each other: each is integrated apart.
+A step damps and pushes, makes its waves, pushes and damps. What the pushes add, the waves of a body at rest take
+away again: v = 0 stays v = 0 and the ground carries the weight, damped or not. Damped and pushed in one flow at
+both ends, as published, a body at rest settles for ever. Damping is e^{−cΔt/2}, a push ∫ b dt by Simpson's rule:
+a fall is exact without damping, of second order with it. The stress is integrated by the scheme of choice:
 
-- `rk4`: the same, sub-stepped node by node so that λ Δt stays below `STIFFNESS_LIMIT`, λ being the rate at which
-  flow relaxes the stress there;
+- `rk4`: the classical fourth-order Runge-Kutta scheme, sub-stepped node by node so that λ Δt stays below
+  `STIFFNESS_LIMIT`, λ being the rate at which flow relaxes the stress there;
 - `analytic`: the rotation exp(ω Δt) and the law's own solution. Flow is isotropic, so the two commute, and there
   is no limit to the step: γ → ∞ gives rate-independent plasticity.
 """
@@ -33,7 +36,7 @@ class NoSources:
 
     kernels: tuple[wp.Kernel, ...] = ()
 
-    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array) -> None:
+    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array, *, ends: bool) -> None:
         """Nothing."""
 
 
@@ -56,15 +59,16 @@ class Sources:
         )
         self.kernels = (self._kernel,)
 
-    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array) -> None:
+    def half_step(self, nodes, internals, body_force: wp.array, dt: wp.array, *, ends: bool) -> None:
         """Advance the nodes by their sources alone.
 
         Args:
             nodes: material nodes; φ and the internals are updated in place.
             body_force: b [m/s²] at the start, in the middle and at the end, on the device.
             dt: the time step [s], on the device.
+            ends: whether it is the half that ends the step.
         """
-        inputs = [self._parameters, body_force, self._damping, dt, nodes, internals]
+        inputs = [self._parameters, body_force, self._damping, int(ends), dt, nodes, internals]
         self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
@@ -171,13 +175,11 @@ def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None,
     remembers = len(law.internals) > 0
 
     @wp.func
-    def rk4_velocity(v: types.vector, b0: types.vector, b1: types.vector, b2: types.vector, c: real, dt: real):
-        half = real(0.5) * dt
-        v1 = b0 - c * v
-        v2 = b1 - c * (v + half * v1)
-        v3 = b1 - c * (v + half * v2)
-        v4 = b2 - c * (v + dt * v3)
-        return v + (dt / real(6.0)) * (v1 + real(2.0) * v2 + real(2.0) * v3 + v4)
+    def damped_and_pushed(v: types.vector, body_force: wp.array(dtype=types.vector), c: real, dt: real, ends: int):
+        push = (dt / real(6.0)) * (body_force[0] + real(4.0) * body_force[1] + body_force[2])
+        if ends == 1:
+            return wp.exp(-c * dt) * (v + push)
+        return wp.exp(-c * dt) * v + push
 
     @forward_kernel
     def source_half_step(
@@ -185,6 +187,7 @@ def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None,
         material: law.Parameters,
         body_force: wp.array(dtype=types.vector),
         damping: real,
+        ends: int,
         dt: wp.array(dtype=real),
         nodes: types.MaterialNodes,
         internals: wp.array(dtype=internal),
@@ -195,7 +198,7 @@ def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None,
         v = space.phi.velocity(point.phi)
         sigma = space.phi.stress(point.phi)
         if wp.static(accelerates):
-            v = rk4_velocity(v, body_force[0], body_force[1], body_force[2], damping, half)
+            v = damped_and_pushed(v, body_force, damping, half, ends)
         if wp.static(advance_stress is not None):
             own = internal()
             if wp.static(remembers):
@@ -203,6 +206,6 @@ def source_kernel(space: Space, law: Law, *, advance_stress: wp.Function | None,
             sigma, own = advance_stress(sigma, own, nodes.velocity_gradient[i], material, half)
             if wp.static(remembers):
                 internals[i] = own
-        nodes.point[i].phi = space.phi.join(v, sigma)
+        nodes.point[i].phi = space.phi.with_stress(space.phi.with_velocity(point.phi, v), sigma)
 
     return source_half_step

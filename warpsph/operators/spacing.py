@@ -17,8 +17,6 @@ from ..physics.space import Space
 from ..state.body import Body
 from .cell_means import edges_function, frame_function
 
-# A step is not shortened beyond this share, or a run in which cells fold would never end.
-LEAST_STEP_SHARE = 0.25
 DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that differ by 3 %
 
 
@@ -37,12 +35,12 @@ class Spacing:
         self.kernels = (self._kernel, *self._largest.kernels)
 
     def shrinkage(self) -> float:
-        """Least time of a wave from node to node over the one at the first call, `LEAST_STEP_SHARE` … 1."""
+        """Least time of a wave from node to node over the one at the first call, at most 1."""
         body = self._body
         body.launcher.launch(self._kernel, self._rate, [body.nodes, body.auxiliary, self._rate])
         fastest = self._largest.of(self._rate)
         self._initial = self._initial or fastest
-        return max(LEAST_STEP_SHARE, self._initial / max(fastest, self._initial))
+        return self._initial / max(fastest, self._initial)
 
 
 @cache

@@ -1,6 +1,9 @@
-"""The unknowns φ = (v, σ) of a node as one vector, since both sweeps treat all of them alike."""
+"""The unknowns φ of a node: named blocks of one vector, since sums over neighbours treat all of them alike.
 
-from dataclasses import dataclass
+Whoever changes one block leaves the others as they are, also those that he does not know of.
+"""
+
+from collections.abc import Iterable
 from functools import cache
 
 import warp as wp
@@ -9,55 +12,51 @@ from ..device.precision import Precision
 from ..mesh.continuum import Continuum
 
 
-@dataclass(frozen=True)
 class Unknowns:
-    """φ and its gradient, and how to take them apart.
+    """φ and its gradient, and three functions a block, here of the block called `velocity`.
 
     Attributes:
-        phi: vector of length d + s.
-        gradient: (d + s) × d matrix ∂φ_k/∂x_l.
-        velocity, stress: φ → v, φ → σ.
-        join: (v, σ) → φ.
-        velocity_gradient, stress_gradient: ∇φ → L (d × d), ∇φ → ∇σ (s × d).
+        phi: vector of as many numbers as all blocks have.
+        gradient: matrix ∂φ_k/∂x_l.
+        velocity: φ → v.
+        with_velocity: (φ, v) → φ with that v, all else as it was.
+        velocity_gradient: ∇φ → ∇v.
+
+    Args:
+        dim: number of dimensions, the columns of ∇φ.
+        precision: float32 or float64.
+        blocks: the name and the length of each block, in their order in φ.
     """
 
-    phi: type
-    gradient: type
-    velocity: wp.Function
-    stress: wp.Function
-    join: wp.Function
-    velocity_gradient: wp.Function
-    stress_gradient: wp.Function
+    def __init__(self, dim: int, precision: Precision, blocks: Iterable[tuple[str, int]]):
+        blocks = tuple(blocks)
+        size = sum(length for _, length in blocks)
+        self.phi, self.gradient = precision.vec(size), precision.mat(size, dim)
+        start = 0
+        for name, length in blocks:
+            self._add(name, start, start + length, precision.vec(length))
+            start += length
+
+    def _add(self, name: str, start: int, end: int, block: type) -> None:
+        @wp.func
+        def get(values: self.phi):
+            return values[wp.static(start) : wp.static(end)]
+
+        @wp.func
+        def replace(values: self.phi, new: block):
+            result = values
+            result[wp.static(start) : wp.static(end)] = new
+            return result
+
+        @wp.func
+        def gradient(grad: self.gradient):
+            return grad[wp.static(start) : wp.static(end)]
+
+        for key, function in ((name, get), (f"with_{name}", replace), (f"{name}_gradient", gradient)):
+            setattr(self, key, function)
 
 
 @cache
 def unknowns(continuum: Continuum, precision: Precision) -> Unknowns:
-    """The unknowns of one continuum in one precision."""
-    d, s = continuum.dim, continuum.stress_size
-    vector, stress_vector, phi = precision.vec(d), precision.vec(s), precision.vec(d + s)
-    gradient = precision.mat(d + s, d)
-
-    @wp.func
-    def velocity(values: phi):
-        return values[: wp.static(d)]
-
-    @wp.func
-    def stress(values: phi):
-        return values[wp.static(d) :]
-
-    @wp.func
-    def join(v: vector, sigma: stress_vector):
-        values = phi()
-        values[: wp.static(d)] = v
-        values[wp.static(d) :] = sigma
-        return values
-
-    @wp.func
-    def velocity_gradient(grad: gradient):
-        return grad[: wp.static(d)]
-
-    @wp.func
-    def stress_gradient(grad: gradient):
-        return grad[wp.static(d) :]
-
-    return Unknowns(phi, gradient, velocity, stress, join, velocity_gradient, stress_gradient)
+    """φ = (v [m/s], σ [Pa]) of one continuum in one precision."""
+    return Unknowns(continuum.dim, precision, (("velocity", continuum.dim), ("stress", continuum.stress_size)))

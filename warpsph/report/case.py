@@ -1,4 +1,7 @@
-"""What a case of the report is made of: the runs it needs, and its section of the page."""
+"""What a case of the report is made of: the runs it needs, and its section of the page.
+
+A case only describes; `make` runs what is missing, `page` writes. A further case is a file in `cases/`.
+"""
 
 from __future__ import annotations
 

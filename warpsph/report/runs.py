@@ -1,4 +1,7 @@
-"""One run of the report: made into a folder of its own, and read back from there."""
+"""One run of the report: made into a folder of its own, and read back from there.
+
+Reading back is what lets the report go on where it was interrupted, and be laid out anew without running anything.
+"""
 
 from __future__ import annotations
 

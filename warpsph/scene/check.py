@@ -37,6 +37,8 @@ class Check:
     bound_below: float | None = None
 
     def __post_init__(self):
+        for field in ("name", "unit"):
+            instance(f"Check.{field}", getattr(self, field), str, "a text")
         for field in ("value", "reference"):
             instance(f"Check.{field}", getattr(self, field), Real, "a number")
         number("Check.bound", self.bound, at_least=0.0)

@@ -1,9 +1,10 @@
 """Boundary conditions on selections of nodes.
 
-Every condition prescribes, direction by direction, either the velocity or the traction. A `Free` edge
-prescribes all tractions (zero); `Fixed` all velocities (zero); a `Roller` the normal velocity and the
-tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and zero traction
-along the others. What happens where conditions meet is in `warpsph.scene.resolve`.
+Every condition prescribes, direction by direction, either the velocity (`rows`) or the traction (`tractions`, zero
+unless it says so). A `Free` edge prescribes all tractions; `Fixed` all velocities (zero); a `Roller` the normal
+velocity and the tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and
+zero traction along the others. What happens where conditions meet is in `warpsph.scene.resolve`, how to add one in
+docs/conditions.md.
 """
 
 from __future__ import annotations
@@ -14,12 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
+from ..mesh.mesh import Mesh
+from ..mesh.reentrant import reentrant_nodes
 from ..validate import TimeFunction, instance, number, time_function, vector
 from .selection import Selection
 
 # One prescribed direction at every selected node: the unit vectors (k, d), and the target velocity along them
 # as a sum of terms, each a coefficient a node (k,) times a function of time.
 Row = tuple[np.ndarray, list[tuple[np.ndarray, TimeFunction]]]
+# A part of the traction on a face: a vector a node (k, d) times a function of time.
+Term = tuple[np.ndarray, TimeFunction]
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,10 @@ class Condition:
         """Whether the condition has no meaning without an outward normal."""
         return False
 
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        """Which nodes the condition holds at, boolean, shape (n,)."""
+        return self.on.nodes(mesh)
+
     def rows(self, points: np.ndarray, normal: np.ndarray | None) -> list[Row]:
         """Prescribed velocity directions at nodes that share one outward normal.
 
@@ -44,6 +53,18 @@ class Condition:
             normal: one of the nodes' outward normals, shape (d,), or None when they have none.
         """
         raise NotImplementedError
+
+    def tractions(self, points: np.ndarray, normal: np.ndarray) -> list[Term]:
+        """Prescribed traction σ n [Pa] at nodes that share one outward normal, a sum of terms; zero without any.
+
+        It is a force on the present area, whose direction in space stays when the face turns. It is prescribed
+        along the directions in which no condition prescribes the velocity.
+
+        Args:
+            points: initial positions of the nodes [m], shape (k, d).
+            normal: their outward normal n, shape (d,).
+        """
+        return []
 
     def check(self, dim: int) -> None:
         """Raise `SceneError` when the condition does not fit `dim` space dimensions."""
@@ -169,12 +190,19 @@ class Rotating(Condition):
 
 @dataclass(frozen=True)
 class Free(EdgeCondition):
-    """A traction-free edge: σ n = 0, with the initial outward normal n.
+    """A traction-free edge: σ n = 0. Nobody moves it; a subclass may load it by its `tractions`.
+
+    Where the edge turns inwards, as in the corner of a notch or of a step, the node has more than half a space of
+    material around it and keeps its stress: both of its normals would take all of that away.
 
     Args:
         on: the nodes.
         normal: the edge's normal; that of the boundary faces unless given.
     """
+
+    def nodes(self, mesh):
+        nodes = self.on.nodes(mesh)
+        return nodes & ~reentrant_nodes(mesh) if self.normal is None else nodes
 
     def rows(self, points, normal):
         return []

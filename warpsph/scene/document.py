@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from ..errors import SceneError, one_of
-from ..validate import choice
+from ..validate import FunctionOfTime, choice
 from .condition import Condition, EdgeCondition
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
@@ -79,6 +79,8 @@ def _encode(value: object, path: str, scene: Scene, arrays: dict) -> object:
         return value
     if isinstance(value, tuple | list):
         return [_encode(part, f"{path}.{k}", scene, arrays) for k, part in enumerate(value)]
+    if isinstance(value, FunctionOfTime):
+        value = value.function
     if isinstance(value, Mapped):
         value = Placed(value.shape, value.mesh().nodes)
     if isinstance(value, where):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 
@@ -35,8 +36,9 @@ def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
     mesh, boundary, output = scene.mesh, scene.boundary, scene.output
     times = np.linspace(0.0, scene.duration, SAMPLES).tolist()
     yield from (("nodes", mesh.nodes), ("cells", mesh.cells), ("faces", mesh.faces))
-    for name in ("nodes", "velocity_projector", "stress_projector", "amplitude", "function", "moved"):
-        yield f"boundary.{name}", getattr(boundary, name)
+    for entry in fields(boundary):
+        if entry.name != "functions":
+            yield f"boundary.{entry.name}", getattr(boundary, entry.name)
     yield "boundary.functions", np.array([_sample(function, times) for function in boundary.functions])
     yield from (("velocity", scene.initial_velocity), ("stress", scene.initial_stress))
     force = scene.body_force

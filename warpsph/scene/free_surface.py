@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,9 @@ import numpy as np
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
 from ..validate import choice, number
+from .condition import Condition
 from .resolve import BoundaryTable
+from .selection import Bare
 
 NORMALS = ("improved", "marrone")
 LARGEST_SCAN = 2.0
@@ -47,15 +50,14 @@ class FreeSurface:
         least = math.sqrt(dim / 2.0)
         number("FreeSurface.scan_ratio", self.scan_ratio, at_least=least, at_most=LARGEST_SCAN)
 
-    def candidates(self, mesh: Mesh, boundary: BoundaryTable) -> np.ndarray:
+    def candidates(self, mesh: Mesh, conditions: Sequence[Condition]) -> np.ndarray:
         """The nodes that can be on the free surface, indices, shape (b,), ascending.
 
-        They are the nodes of the boundary faces that no velocity condition covers. The body can not tear, as
-        auxiliary nodes stay in the middle of their initial cells, so no other node ever gets there. A node
-        at the end of a wall is one of them: it belongs to the free surface as well.
+        They are the nodes of the boundary faces that none of the velocity conditions covers. The body can not
+        tear, as auxiliary nodes stay in the middle of their initial cells, so no other node ever gets there. A
+        node at the end of a wall is one of them, also where walls end on both sides of a face.
         """
-        moved = self.moved(mesh, boundary)
-        return np.unique(mesh.faces[~moved[mesh.faces].all(axis=1)])
+        return np.unique(mesh.faces[Bare(tuple(condition.on for condition in conditions)).faces(mesh)])
 
     def moved(self, mesh: Mesh, boundary: BoundaryTable) -> np.ndarray:
         """Which nodes are under a velocity condition, boolean, shape (n,)."""

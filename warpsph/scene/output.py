@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
 from ..errors import SceneError
+from ..mesh.mesh import Mesh
 from ..validate import choice, index, instance, listed, number, vector
 from .selection import Selection
 
@@ -31,6 +34,25 @@ class Probe:
         instance("Probe.unit", self.unit, str, "a unit, for example 'Pa'")
         instance("Probe.function", self.function, Callable, "a function of the simulation")
 
+    def sample(self, simulation) -> float:
+        """The number as it is now; NaN where it is not defined.
+
+        Raises:
+            SceneError: what the function returns is no real number.
+        """
+        value = self.function(simulation)
+        if not isinstance(value, Real | np.bool_):
+            allowed = (
+                f"its function must return a real number; at t = {simulation.time:.6g} s it gave {value!r:.60}"
+            )
+            raise SceneError("Output.probes", self.name, allowed)
+        return float(value)
+
+    def check(self, mesh: Mesh) -> None:
+        """Raise `SceneError` when a function of ours asks for something that the mesh does not have."""
+        if isinstance(self.function, NodeValue | EdgeForce):
+            self.function.check(mesh)
+
 
 @dataclass(frozen=True)
 class NodeValue:
@@ -49,6 +71,16 @@ class NodeValue:
     def __post_init__(self):
         instance("NodeValue.field", self.field, str, "the name of a field")
         object.__setattr__(self, "near", vector("NodeValue.near", self.near))
+        index("NodeValue.component", self.component)
+
+    def check(self, mesh: Mesh) -> None:
+        """Raise `SceneError` when the point is not in the body, to within a cell."""
+        distance = np.linalg.norm(mesh.nodes - vector("NodeValue.near", self.near, mesh.dim), axis=1)
+        node = int(distance.argmin())
+        if distance[node] > math.sqrt(mesh.dim) * mesh.largest_edge():
+            at = tuple(round(x, 6) for x in mesh.nodes[node].tolist())
+            allowed = f"it must be in the body; the nearest node, at {at}, is {distance[node]:.4g} m away"
+            raise SceneError("NodeValue.near", self.near, allowed)
 
     def __call__(self, simulation) -> float:
         values = component("NodeValue", simulation.field(self.field), self.component)
@@ -80,12 +112,19 @@ class EdgeForce:
         instance("EdgeForce.on", self.on, Selection, "a selection such as edge('top')")
         index("EdgeForce.axis", self.axis)
 
+    def check(self, mesh: Mesh) -> None:
+        """Raise `SceneError` when the mesh has no such axis, or the selection none of its boundary faces."""
+        index("EdgeForce.axis", self.axis, below=mesh.dim)
+        if not self._faces(mesh).any():
+            raise SceneError("EdgeForce.on", self.on, "it must hold all nodes of at least one boundary face")
+
+    def _faces(self, mesh: Mesh) -> np.ndarray:
+        return self.on.nodes(mesh)[mesh.faces].all(axis=1) & self.on.faces(mesh)
+
     def __call__(self, simulation) -> float:
         mesh, continuum = simulation.mesh, simulation.mesh.continuum
-        index("EdgeForce.axis", self.axis, below=continuum.dim)
-        chosen = self.on.nodes(mesh)[mesh.faces].all(axis=1) & self.on.faces(mesh)
-        if not chosen.any():
-            raise SceneError("EdgeForce.on", self.on, "it must hold all nodes of at least one boundary face")
+        self.check(mesh)
+        chosen = self._faces(mesh)
         current = mesh.with_nodes(simulation.field("position"))
         normals = current.face_normals()[chosen]
         area = current.face_areas()[chosen]
@@ -139,6 +178,13 @@ class Output:
             number("Output.curve_reference", value)
         instance("Output.field", self.field, str, "the name of a field")
         index("Output.component", self.component)
+
+    def check(self, mesh: Mesh, duration: float) -> None:
+        """Raise `SceneError` when it does not fit the mesh or the duration [s]."""
+        if self.interval is not None:
+            number("Output.interval", self.interval, at_most=duration)
+        for probe in self.probes:
+            probe.check(mesh)
 
 
 def _pair(field: str, value: object, allowed: str) -> tuple[object, object]:

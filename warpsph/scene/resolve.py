@@ -1,23 +1,27 @@
-"""Resolves overlapping conditions into one linear statement a node.
+"""Resolves overlapping conditions into one affine statement a node.
 
 At a constrained node, applying the conditions at time t means
 
-    v ← P v + Σ_k a_k f_k(t),        σ ← Π σ,
+    v ← P v + Σ_k a_k f_k(t),        σ ← Π σ + Σ_k G_k t_k f_k(t),
 
-with P the projector onto the directions whose velocity is free and Π a projector onto the stresses whose
-prescribed tractions vanish, orthogonal in the Frobenius norm (tractions are cut off, as published) or in that of
-the elastic energy (they go by elastic unloading: Π = 1 − Dₑ Nᵀ (N Dₑ Nᵀ)⁻¹ N, N the tractions' rows). Where
-conditions meet (METHOD section 5):
+with P the projector onto the directions whose velocity is free, Π a projector onto the stresses whose prescribed
+tractions vanish, and t_k the prescribed tractions, vectors in space, which the stress G_k t_k has. Π is orthogonal
+in the Frobenius norm (tractions are put in place, all else kept, as published) or in that of the elastic energy
+(they go and come by elastic strain): with N the tractions' rows, N σ their values, and D that norm's metric, the
+identity or Dₑ, G N = D Nᵀ (N D Nᵀ)⁻¹ N = 1 − Π. Where conditions meet (METHOD section 5):
 
 - a velocity condition beats a traction condition: a free edge frees only the directions that nobody moves;
 - a wall without friction keeps its zero shear at its ends as well, as a plane of symmetry does;
-- where two free edges meet, all in-plane stresses vanish (this follows from the two normals);
-- two conditions that give one direction different velocities, or that call one face free and moved, contradict
-  each other and are refused.
+- where two free edges meet, all in-plane stresses vanish (this follows from the two normals), but none in an inner
+  corner (see `Free`);
+- where tractions contradict each other, as at the end of a load, their mean holds;
+- two conditions that give one direction different velocities, that call one face free and moved, or that load one
+  face twice, contradict each other and are refused.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,8 +48,11 @@ class BoundaryTable:
         velocity_projector: P, shape (b, d, d).
         stress_projector: Π on the stored stress components, shape (b, s, s).
         functions: the distinct functions of time f_k.
-        amplitude: a_k, shape (b, K, d); K is the largest number of terms at a node.
+        amplitude: a_k [m/s], shape (b, K, d); K is the largest number of terms at a node.
         function: index into `functions` of each term, shape (b, K).
+        traction: t_k [Pa], shape (b, M, d); M is the largest number of terms at a node, zero without loads.
+        traction_stress: G_k, from a traction to the stress that has it, as stored, shape (b, M, s, d).
+        traction_function: index into `functions` of each traction, shape (b, M).
         moved: whether a velocity component is prescribed, shape (b,).
     """
 
@@ -55,33 +62,43 @@ class BoundaryTable:
     functions: tuple[TimeFunction, ...]
     amplitude: np.ndarray
     function: np.ndarray
+    traction: np.ndarray
+    traction_stress: np.ndarray
+    traction_function: np.ndarray
     moved: np.ndarray
+
+    @property
+    def loaded(self) -> bool:
+        """Whether a traction other than zero is prescribed anywhere."""
+        return self.traction.shape[1] > 0
 
 
 def resolve(mesh: Mesh, conditions: Sequence[Condition], stiffness: np.ndarray | None = None) -> BoundaryTable:
-    """Resolve the conditions on a lattice; see the module's text for the rules.
+    """Resolve the conditions on a mesh; see the module's text for the rules.
 
     Args:
-        lattice: the lattice.
+        mesh: the mesh.
         conditions: the conditions.
-        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then vanish by elastic
-            unloading. They are cut off, all other components kept, unless it is given.
+        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then go and come by elastic
+            strain. They are put in place, all other components kept, unless it is given.
     """
-    dim, continuum = mesh.dim, mesh.continuum
-    groups = _groups(mesh, conditions)
+    dim, size, groups = mesh.dim, mesh.continuum.stress_size, _groups(mesh, conditions)
     nodes = np.array(sorted(node for members in groups.values() for node in members), dtype=np.int64)
     row_of = {node: row for row, node in enumerate(nodes.tolist())}
-    size = continuum.stress_size
     if stiffness is None:
-        stiffness = np.diag([1.0 if i == j else 0.5 for i, j in continuum.pairs])
+        stiffness = np.diag([1.0 if i == j else 0.5 for i, j in mesh.continuum.pairs])
     projectors = np.zeros((len(nodes), dim, dim))
     stress = np.zeros((len(nodes), size, size))
     moved = np.zeros(len(nodes), dtype=bool)
     functions: list[TimeFunction] = []
-    terms: dict[int, list[tuple[np.ndarray, int]]] = defaultdict(list)
+    velocities, tractions, lifts = (
+        _Terms(functions, (dim,)),
+        _Terms(functions, (dim,)),
+        _Terms(functions, (size, dim)),
+    )
 
     for signature, members in groups.items():
-        where = np.array([row_of[node] for node in members])
+        where = [row_of[node] for node in members]
         points = mesh.nodes[members]
         rows = [
             row
@@ -94,27 +111,62 @@ def resolve(mesh: Mesh, conditions: Sequence[Condition], stiffness: np.ndarray |
         projector = _clean(np.eye(dim) - inverse @ directions)
         _refuse_contradiction(directions, rows, signature, conditions, points)
         projectors[where] = projector
-        stress[where] = _stress_projector(signature, conditions, projector, points, continuum, stiffness)
         moved[where] = len(rows) > 0
         for column, (_, parts) in zip(inverse.T, rows, strict=True):
             for coefficient, function in parts:
-                if not callable(function) and function == 0.0:
-                    continue
-                if function not in functions:
-                    functions.append(function)
-                for row, factor in zip(where, coefficient, strict=True):
-                    terms[row].append((factor * column, functions.index(function)))
+                velocities.add(where, coefficient[:, None] * column, function)
+        faces = _prescribed_tractions(signature, conditions, projector, points)
+        stress[where], lifts_here = _stress_map(faces, mesh.continuum, stiffness)
+        for (condition, normal, _), lift in zip(faces, lifts_here, strict=True):
+            for vectors, function in condition.tractions(points, normal):
+                tractions.add(where, vectors, function)
+                lifts.add(where, [lift] * len(where), function)
 
-    width = max((len(parts) for parts in terms.values()), default=0)
-    amplitude = np.zeros((len(nodes), width, dim))
     spare = len(functions)  # short rows end in a constant zero, since zero times a drive that is NaN is NaN
-    function = np.full((len(nodes), width), spare, dtype=np.int32)
-    for row, parts in terms.items():
-        for k, (vector, index) in enumerate(parts):
-            amplitude[row, k], function[row, k] = vector, index
-    if (function == spare).any():
+    amplitude, function = velocities.arrays(len(nodes), spare)
+    traction, traction_function = tractions.arrays(len(nodes), spare)
+    traction_stress, _ = lifts.arrays(len(nodes), spare)
+    if spare in function or spare in traction_function:
         functions.append(0.0)
-    return BoundaryTable(nodes, projectors, stress, tuple(functions), amplitude, function, moved)
+    return BoundaryTable(
+        nodes=nodes,
+        velocity_projector=projectors,
+        stress_projector=stress,
+        functions=tuple(functions),
+        amplitude=amplitude,
+        function=function,
+        traction=traction,
+        traction_stress=traction_stress,
+        traction_function=traction_function,
+        moved=moved,
+    )
+
+
+class _Terms:
+    """Sums of vectors or matrices times functions of time, a sum a row, as they are put together."""
+
+    def __init__(self, functions: list[TimeFunction], shape: tuple[int, ...]):
+        self._functions, self._shape = functions, shape
+        self._of_row: dict[int, list[tuple[np.ndarray, int]]] = defaultdict(list)
+
+    def add(self, rows: Sequence[int], values: Sequence[np.ndarray], function: TimeFunction) -> None:
+        """Add a value to each of the rows, times a function of time; not a constant zero."""
+        if not callable(function) and function == 0.0:
+            return
+        if function not in self._functions:
+            self._functions.append(function)
+        for row, value in zip(rows, values, strict=True):
+            self._of_row[row].append((value, self._functions.index(function)))
+
+    def arrays(self, count: int, spare: int) -> tuple[np.ndarray, np.ndarray]:
+        """Values and indices of their functions, a row each, of one length: short ones end in `spare`."""
+        width = max(map(len, self._of_row.values()), default=0)
+        values = np.zeros((count, width, *self._shape))
+        function = np.full((count, width), spare, dtype=np.int32)
+        for row, terms in self._of_row.items():
+            for k, (value, index) in enumerate(terms):
+                values[row, k], function[row, k] = value, index
+        return values, function
 
 
 Signature = tuple[tuple[int, tuple[tuple[float, ...], ...]], ...]
@@ -127,6 +179,10 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         for node in corners:
             touching[node].append(face)
     face_normals = mesh.face_normals()
+    unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
+    for condition in conditions:
+        if isinstance(condition, Free) and condition.normal is None:
+            unmoved |= condition.on.faces(mesh)
     signatures: dict[int, list] = defaultdict(list)
     selected, covered = [], []
     for index, condition in enumerate(conditions):
@@ -137,9 +193,10 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         selected.append(nodes)
         covered.append(faces & nodes[mesh.faces].all(axis=1))
         given = getattr(condition, "normal", None)
-        for node in np.flatnonzero(nodes).tolist():
-            own = [face for face in touching.get(node, ()) if faces[face]]
-            normals = (given,) if given is not None else _smooth_normals(face_normals[own])
+        edge = unmoved if isinstance(condition, Free) else faces
+        for node in np.flatnonzero(condition.nodes(mesh)).tolist():
+            around = [face for face in touching.get(node, ()) if edge[face]]
+            normals = (given,) if given is not None else _smooth_normals(face_normals[around], faces[around])
             if not normals and condition.takes_normal:
                 raise SceneError(
                     f"conditions[{index}]",
@@ -148,39 +205,48 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
                     f"give normal=…",
                 )
             signatures[node].append((index, normals))
-    _refuse_free_and_moved(conditions, covered)
+    _refuse_shared_faces(mesh, conditions, covered)
     groups: dict[Signature, list[int]] = defaultdict(list)
     for node, signature in signatures.items():
         groups[tuple(signature)].append(node)
     return groups
 
 
-def _smooth_normals(normals: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged."""
-    clusters: list[list[np.ndarray]] = []
-    for normal in normals:
+def _smooth_normals(normals: np.ndarray, own: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged.
+
+    Only edges with a face of the condition's own count.
+    """
+    clusters: list[list[int]] = []
+    for face, normal in enumerate(normals):
         for cluster in clusters:
-            if normal @ cluster[0] > np.cos(SMOOTH_EDGE_ANGLE):
-                cluster.append(normal)
+            if normal @ normals[cluster[0]] > np.cos(SMOOTH_EDGE_ANGLE):
+                cluster.append(face)
                 break
         else:
-            clusters.append([normal])
-    means = [np.mean(cluster, axis=0) for cluster in clusters]
+            clusters.append([face])
+    means = [np.mean(normals[cluster], axis=0) for cluster in clusters if own[cluster].any()]
     return tuple(tuple(np.round(mean / np.linalg.norm(mean), 12).tolist()) for mean in means)
 
 
-def _refuse_free_and_moved(conditions: Sequence[Condition], covered: list[np.ndarray]) -> None:
-    for i, first in enumerate(conditions):
-        for j, second in enumerate(conditions):
-            if isinstance(first, Free) and not isinstance(second, Free):
-                shared = int((covered[i] & covered[j]).sum())
-                if shared:
-                    raise SceneError(
-                        f"conditions[{i}]",
-                        first,
-                        f"it shares {shared} boundary face(s) with conditions[{j}] = {second}, which moves or "
-                        f"holds them; a face is either free or moved",
-                    )
+def _refuse_shared_faces(mesh: Mesh, conditions: Sequence[Condition], covered: list[np.ndarray]) -> None:
+    """A face is either free or moved, and loaded by one condition at most."""
+    normals = mesh.face_normals()
+    for i, j in itertools.permutations(range(len(conditions)), 2):
+        first, second, shared = conditions[i], conditions[j], np.flatnonzero(covered[i] & covered[j])
+        if not len(shared):
+            continue
+        if isinstance(first, Free) and not isinstance(second, Free):
+            reason = "moves or holds them; a face is either free or moved"
+        elif first.tractions(mesh.nodes[mesh.faces[shared[0]]], normals[shared[0]]):
+            reason = "is on them as well; a face that is loaded has one condition"
+        else:
+            continue
+        raise SceneError(
+            f"conditions[{i}]",
+            first,
+            f"it shares {len(shared)} boundary face(s) with conditions[{j}] = {second}, which {reason}",
+        )
 
 
 def _refuse_contradiction(directions, rows, signature, conditions, points) -> None:
@@ -210,27 +276,45 @@ def _refuse_contradiction(directions, rows, signature, conditions, points) -> No
         )
 
 
-def _stress_projector(signature, conditions, projector, points, continuum: Continuum, stiffness) -> np.ndarray:
-    """Π at a node: the stresses for which every prescribed traction component vanishes."""
-    rows = []
+Tractions = tuple[Condition, np.ndarray, np.ndarray]
+
+
+def _prescribed_tractions(signature, conditions, projector, points) -> list[Tractions]:
+    """The conditions at a node, with a normal n and the directions u (k, d) along which they prescribe u · σ n."""
+    found = []
     for index, normals in signature:
         condition = conditions[index]
-        for normal in normals:
-            normal = np.array(normal)
+        for normal in map(np.array, normals):
             own = np.array([vectors[0] for vectors, _ in condition.rows(points[:1], normal)])
             own = own.reshape(-1, len(normal))
             free_here = np.eye(len(normal)) - np.linalg.pinv(own, rcond=TOLERANCE) @ own
             if isinstance(condition, Free):
                 free_here = projector
+            directions = []
             for u in _basis(free_here):
                 moved_along_u = np.linalg.norm(projector @ u) < 1.0 - TOLERANCE
                 if not (moved_along_u and abs(u @ normal) > TOLERANCE):  # shear stays, see the module's text
-                    rows.append(_traction_row(u, normal, continuum))
-    if not rows:
-        return np.eye(continuum.stress_size)
-    traction = np.array(rows)
+                    directions.append(u)
+            if directions:
+                found.append((condition, normal, np.array(directions)))
+    return found
+
+
+def _stress_map(
+    faces: Sequence[Tractions], continuum: Continuum, stiffness: np.ndarray
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Π at a node, and for each of the prescribed tractions G (s, d), from its vector to a stress that has it."""
+    if not faces:
+        return np.eye(continuum.stress_size), []
+    traction = np.array(
+        [_traction_row(u, normal, continuum) for _, normal, directions in faces for u in directions]
+    )
     compliance = np.linalg.pinv(traction @ stiffness @ traction.T, rcond=TOLERANCE)
-    return _clean(np.eye(continuum.stress_size) - stiffness @ traction.T @ compliance @ traction)
+    solutions = stiffness @ traction.T @ compliance
+    ends = np.cumsum([len(along) for _, _, along in faces])
+    parts = zip(np.split(solutions, ends[:-1], axis=1), faces, strict=True)
+    lifts = [_clean(columns @ along) for columns, (_, _, along) in parts]
+    return _clean(np.eye(continuum.stress_size) - solutions @ traction), lifts
 
 
 def _clean(matrix: np.ndarray) -> np.ndarray:

@@ -130,6 +130,7 @@ class Scene:
         scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
         scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
+        self.output.check(self.mesh, self.duration)
         _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:
@@ -139,7 +140,7 @@ class Scene:
             if isinstance(condition, Free):
                 allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
-        if not len(surface.candidates(self.mesh, self.boundary)):
+        if not len(surface.candidates(self.mesh, self.conditions)):
             raise SceneError(
                 "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
             )

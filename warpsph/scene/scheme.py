@@ -18,7 +18,8 @@ from ..mesh.mesh import Mesh
 
 
 class Fluxes(Protocol):
-    """Steps 3-10 of a body, the waves: built as `fluxes(body, conditions=…, around_auxiliary=…, around_nodes=…)`.
+    """Steps 3-10 of a body, the waves: built as `fluxes(body, conditions=…, around_auxiliary=…, around_nodes=…,
+    faults=…)`.
 
     Attributes:
         kernels: all that it launches.

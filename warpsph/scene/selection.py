@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
-from ..validate import choice, field_of_position, index, vector
+from ..validate import choice, index, mask_of_position, vector
 
 
 class Selection:
@@ -37,12 +37,17 @@ class Selection:
     def __invert__(self) -> Selection:
         return Outside(self)
 
+    def __bool__(self) -> bool:
+        """Refused: Python's `and`, `or` and `not` would give one of the selections and forget the other."""
+        raise SceneError("selection", self, "selections combine with &, | and ~, not with and, or and not")
+
 
 @dataclass(frozen=True)
 class edge(Selection):  # noqa: N801 - written as a word in scenes
     """The nodes of a named edge: left, right, bottom, top, in 3D also front and back; `boundary` is all.
 
-    Names refer to the axes of the lattice before it was rotated or mapped.
+    A name stands for the end of the lattice on that side, before it was rotated or mapped. Steps, notches and
+    holes in between belong to `boundary` only: the slope of a bank is no part of its right edge.
 
     >>> from warpsph import Box
     >>> edge("left").nodes(Box((1.0,), 0.5).mesh())
@@ -111,7 +116,7 @@ class where(Selection):  # noqa: N801
         extent = max(np.abs(mesh.nodes).max(), mesh.spacing)
         decimals = 12 - int(np.ceil(np.log10(extent)))
         points = np.round(mesh.nodes, decimals)
-        return field_of_position("where", self.function, points, 1)[:, 0].astype(bool)
+        return mask_of_position("where", self.function, points)
 
 
 @dataclass(frozen=True, eq=False)

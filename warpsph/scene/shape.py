@@ -12,6 +12,7 @@ from ..errors import SceneError
 from ..mesh import outline
 from ..mesh.lattice import grid_lattice, hinges, parts
 from ..mesh.mesh import Mesh
+from ..mesh.overlap import overlap
 from ..validate import field_of_position, instance, number, vector
 
 
@@ -254,6 +255,10 @@ class Placed(Shape):
 def _unfolded(mesh: Mesh, field: str, value: object) -> Mesh:
     if mesh.cell_volumes().min() <= 0.0:
         raise SceneError(field, value, "it must keep every cell's volume positive (no folds)")
+    place = overlap(mesh)
+    if place is not None:
+        at = ", ".join(f"{x:.4g}" for x in place)
+        raise SceneError(field, value, f"it must not lay the body on itself, as it does at ({at})")
     return mesh
 
 

@@ -55,7 +55,7 @@ def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:
 
 
 FIELDS: dict[str, Field] = {
-    "position": Field("m", "(n, d)", "current position x", lambda s: s.nodes.point.numpy()["x"].copy()),
+    "position": Field("m", "(n, d)", "position x = X + u", lambda s: s.mesh.nodes + s.nodes.displacement.numpy()),
     "displacement": Field("m", "(n, d)", "u = x − X", lambda s: s.nodes.displacement.numpy().copy()),
     "velocity": Field("m/s", "(n, d)", "velocity v", lambda s: _phi(s)[:, : s.mesh.dim].copy()),
     "stress": Field("Pa", "(n, s)", "Cauchy stress σ, stored components, tension positive", _stress),

@@ -76,7 +76,7 @@ class History:
         """Sample now, unless this step was sampled already."""
         if self._rows and self._rows[-1][0] == simulation.steps:
             return
-        row = [simulation.steps, simulation.time, *(probe.function(simulation) for probe in self._probes)]
+        row = [simulation.steps, simulation.time, *(probe.sample(simulation) for probe in self._probes)]
         self._rows.append(row)
         if self._file:
             self._file.write([_texts(row)])

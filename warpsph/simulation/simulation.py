@@ -13,12 +13,13 @@ import numpy as np
 from ..device.exclusive import exclusive
 from ..device.launching import Launcher
 from ..device.precision import precision as precision_of
-from ..errors import NonFiniteError, SceneError, one_of
+from ..errors import SceneError, one_of
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
 from ..step.step import Stepper
 from ..validate import instance, number, vector
+from .breakdown import FLATTENED, LEAST_STEP_SHARE, breakdown
 from .device import choose_device, choose_threads
 from .fields import fields_of
 from .interrupts import held_back
@@ -101,7 +102,8 @@ class Simulation:
             time_step: Δt [s]; `time_step_limit` unless given, which it must not exceed.
 
         Raises:
-            NonFiniteError: velocity, stress or displacement stopped being finite.
+            BreakdownError: something can not be true: a value that is not finite (NonFiniteError), a folded cell,
+                neighbours that part faster than waves.
         """
         dt = self.time_step_limit
         if time_step is not None:
@@ -119,7 +121,7 @@ class Simulation:
             observers: told after every step, or when their `next_time` has come.
 
         Raises:
-            NonFiniteError: velocity, stress or displacement stopped being finite; observers keep what they have.
+            BreakdownError: as for `step`; observers keep what they have.
         """
         end = self.scene.duration if until is None else number("until", until, at_least=self.time)
         observers = tuple(observers)
@@ -151,13 +153,9 @@ class Simulation:
         self.shortest_step = min(self.shortest_step, dt)
         self.longest_step = max(self.longest_step, dt)
         self.wall_time += clock.perf_counter() - begin
-        if outcome.non_finite:
-            node = self._first_non_finite()
-            raise NonFiniteError(self.steps, self.time, node, self.mesh.nodes[node])
-
-    def _first_non_finite(self) -> int:
-        values = [self.nodes.point.numpy()["phi"], self.nodes.displacement.numpy()]
-        return int(np.argmin(np.isfinite(np.hstack(values)).all(axis=1)))
+        fault = outcome.fault or (FLATTENED if self.stepper.lists.shrinkage < LEAST_STEP_SHARE else None)
+        if fault is not None:
+            raise breakdown(self, fault, dt)
 
     @exclusive
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:

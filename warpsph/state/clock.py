@@ -18,7 +18,11 @@ from ..physics.space import Space
 
 LONGEST_RUN = 256  # steps
 HALF, END = 0, 1  # rows of `Clock.drive`
-NON_FINITE, FIRST_FLAG, MOST_FLAGS = 2, 3, 2  # where they stand in the status, and how many there may be
+# What ends a run because it can not be true, in the order in which it is told.
+FAULTS = ("non_finite", "folded", "too_fast")
+NON_FINITE, FOLDED, TOO_FAST = 0, 1, 2
+FIRST_FAULT, MOST_FLAGS = 2, 2  # where faults stand in the status; how many flags follow them, at most
+FIRST_FLAG = FIRST_FAULT + len(FAULTS)
 STAGES = 5  # t, t + Δt/4, …, t + Δt: the classical scheme needs both ends and the middle of each half step
 
 
@@ -27,12 +31,12 @@ class Outcome(NamedTuple):
 
     Attributes:
         made: how many were made.
-        non_finite: whether a value stopped being finite.
+        fault: what can not be true, one of `FAULTS`, or None.
         outdated: the number of the first flag that a kernel has raised, in the order of `Clock.new_flag`, or None.
     """
 
     made: int
-    non_finite: bool
+    fault: str | None
     outdated: int | None
 
 
@@ -47,7 +51,7 @@ class Clock:
         time_step: Δt [s].
         first_half, second_half: b at the start, the middle and the end of each half step.
         drive: values of the functions, those at t + Δt/2 in row `HALF`, those at t + Δt in row `END`.
-        non_finite: one integer, set by kernels.
+        faults: an integer each of `FAULTS`, set by kernels.
         going: 1 while steps are to be made.
         kernels: the kernel of `tick`.
     """
@@ -68,12 +72,12 @@ class Clock:
         self._drive = wp.zeros(2 * columns, dtype=real, device=device)
         self.drive = self._drive.reshape((2, columns))
         self.time_step = wp.zeros(1, dtype=real, device=device)
-        # Steps made, steps to make, not finite, flags.
+        # Steps made, steps to make, faults, flags.
         self._status = wp.zeros(FIRST_FLAG + MOST_FLAGS, dtype=wp.int32, device=device)
         self._flags = 0
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
         self.first_half, self.second_half = self._force[:3], self._force[2:]
-        self.non_finite = self._status[NON_FINITE : NON_FINITE + 1]
+        self.faults = self._status[FIRST_FAULT:FIRST_FLAG]
         self._tick = _tick_kernel(space)
         self.kernels = (self._tick,)
 
@@ -106,8 +110,10 @@ class Clock:
 
     def outcome(self) -> Outcome:
         """What the steps since `begin` came to."""
-        made, _, non_finite, *flags = self._status.numpy().tolist()
-        return Outcome(made, bool(non_finite), next((k for k, raised in enumerate(flags) if raised), None))
+        status = self._status.numpy().tolist()
+        fault = next((name for name, raised in zip(FAULTS, status[FIRST_FAULT:], strict=False) if raised), None)
+        flag = next((k for k, raised in enumerate(status[FIRST_FLAG:]) if raised), None)
+        return Outcome(status[0], fault, flag)
 
 
 def _value(function, t: float) -> float:
@@ -139,7 +145,7 @@ def _tick_kernel(space: Space):
         made = status[0] + 1
         status[0] = made
         raised = wp.int32(0)
-        for k in range(NON_FINITE, status.shape[0]):
+        for k in range(FIRST_FAULT, status.shape[0]):
             raised += status[k]
         if made >= status[1] or raised > 0:
             going[0] = 0

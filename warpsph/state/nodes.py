@@ -17,13 +17,13 @@ def material_nodes(scene: Scene, space: Space, device: wp.Device):
     position X [m]; `displacement` u [m], the unknown that is integrated, since in float32 Δt·v is often below the
     last bit of x; `density` ρ [kg/mᵈ]; `smoothing_length` h [m]; `weight` ρ₀V₀ [kg], so that V = ρ₀V₀/ρ;
     `half_velocity` v^{n+1/2} [m/s]; `velocity_gradient` L [1/s] of v^{n+1/2}, which turns the stresses in the
-    source steps.
+    source steps. Positions are from `mesh.middle`: far from it float32 has no digits left.
     """
     mesh, density, types = scene.mesh, scene.material.density, space.types
     n = len(mesh.nodes)
     _, volume = mesh.node_volumes()
     point = np.zeros(n, dtype=types.Point.numpy_dtype())
-    point["x"] = mesh.nodes
+    point["x"] = mesh.nodes - mesh.middle
     point["phi"] = np.concatenate([scene.initial_velocity, scene.initial_stress], axis=1)
     nodes = types.MaterialNodes()
 
@@ -32,7 +32,7 @@ def material_nodes(scene: Scene, space: Space, device: wp.Device):
 
     nodes.point = array(point, types.Point)
     nodes.volume = array(volume, space.real)
-    nodes.reference = array(mesh.nodes, types.vector)
+    nodes.reference = array(mesh.nodes - mesh.middle, types.vector)
     nodes.displacement = wp.zeros(n, dtype=types.vector, device=device)
     nodes.density = array(np.full(n, density), space.real)
     nodes.smoothing_length = array(initial_smoothing_length(scene, volume), space.real)

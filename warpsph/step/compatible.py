@@ -27,6 +27,7 @@ from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.front import STRENGTH, front_pressure
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import NeighbourSums, batch_on, cell_metric, neighbour_sums
+from ..operators.watch import watch_rate
 from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scheme import Scheme, wave_limit
@@ -79,13 +80,22 @@ class CompatibleFluxes:
         body: the body.
         conditions: its boundary conditions.
         around_auxiliary, around_nodes: the pair lists.
+        faults: where kernels note what can not be true.
 
     Attributes:
         kernels: the kernels of the two passes.
     """
 
-    def __init__(self, body: Body, *, conditions: Conditions, around_auxiliary: PairList, around_nodes: PairList):
-        self._body, self._conditions = body, conditions
+    def __init__(
+        self,
+        body: Body,
+        *,
+        conditions: Conditions,
+        around_auxiliary: PairList,
+        around_nodes: PairList,
+        faults: wp.array,
+    ):
+        self._body, self._conditions, self._faults = body, conditions, faults
         self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
         scene, space, law, device = body.scene, body.space, body.law, body.launcher.device
         self._front, self._corner_share = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
@@ -115,7 +125,7 @@ class CompatibleFluxes:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         body = self._body
         inputs = [body.parameters, self._conditions.table, dt, self._corner_share, self._around_nodes]
-        inputs += [body.auxiliary, body.node_cells, self._cells, body.nodes]
+        inputs += [body.auxiliary, body.node_cells, self._cells, body.nodes, self._faults]
         body.launcher.launch(self._to_nodes, body.nodes.point, inputs)
 
 
@@ -154,14 +164,17 @@ def _to_auxiliary_kernel(
         if wp.static(law.flows):
             mean, smooth = internal(), types.tensor()
             for k in range(wp.static(kind.corners)):
+                i = auxiliary.cell[a, k]
                 if wp.static(len(law.internals) > 0):
-                    mean += internals[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
-                smooth += nodes.velocity_gradient[auxiliary.cell[a, k]] / real(wp.static(kind.corners))
+                    mean += internals[i] / real(wp.static(kind.corners))
+                smooth += nodes.velocity_gradient[i] / real(wp.static(kind.corners))
             rough = space.stress.elastic_rate(L - smooth, material.lame, material.shear, material.young)
             elastic = real(0.5) * dt * rough
             flowed, _ = law.relax(space.phi.stress(half) - elastic, mean, material, real(0.5) * dt)
-            half = space.phi.join(space.phi.velocity(half), flowed + elastic)
-        auxiliary.point[a].phi = half - phi + space.phi.join(types.vector(), space.stress.spherical(q))
+            half = space.phi.with_stress(half, flowed + elastic)
+        change = half - phi
+        pressed = space.phi.stress(change) + space.stress.spherical(q)
+        auxiliary.point[a].phi = space.phi.with_stress(change, pressed)
         means.store.write(a, cell, cells)
 
     return to_auxiliary
@@ -178,7 +191,7 @@ def _to_nodes_kernel(
     conditions: ConditionTypes,
 ):
     types, real, phi = space.types, space.real, space.phi
-    rate, damped = wave_rate(space, law.Parameters), taken_off(space)
+    rate, damped, watch = wave_rate(space, law.Parameters), taken_off(space), watch_rate(space)
     packed_nodes, packed_auxiliary = packed(types.MaterialNodes), packed(types.AuxiliaryNodes)
 
     @forward_kernel
@@ -193,6 +206,7 @@ def _to_nodes_kernel(
         node_cells: NodeCells,
         cells: wp.array2d(dtype=real),
         nodes: types.MaterialNodes,
+        faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
         packed_nodes(nodes)
@@ -210,9 +224,10 @@ def _to_nodes_kernel(
         phi_adv = point.phi + dt * minus_div_f  # 10
         v_adv = phi.velocity(phi_adv) - real(VELOCITY_SHARE) * phi.velocity(checkerboard)
         lost = damped(phi.stress(checkerboard), nodes.velocity_gradient[i], material.shear, dt)
-        nodes.point[i].phi = phi.join(v_adv, phi.stress(phi_adv) - lost)
+        nodes.point[i].phi = phi.with_stress(phi.with_velocity(phi_adv, v_adv), phi.stress(phi_adv) - lost)
         nodes.half_velocity[i] = phi.velocity(phi_half)
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
+        watch(phi.velocity_gradient(grad), dt, faults)
 
     return to_nodes
 

@@ -1,7 +1,7 @@
 """The pair lists of both node sets around each other, renewed when nodes have used up the lists' skin."""
 
 from ..device.compiling import load_kernels
-from ..operators.motion import NoMotion, centre_kernel
+from ..operators.motion import SmallMotion, centre_kernel
 from ..state.body import Body
 from ..state.clock import Clock
 from ..state.pairs import SKIN, Neighbours, Search
@@ -28,10 +28,12 @@ class PairLists:
         centre = centre_kernel(body.space, body.kind)
         load_kernels([centre], launcher.device)
         launcher.launch(centre, auxiliary.point, [nodes, auxiliary])
-        skin, self.motion, self._outdated = 0.0, NoMotion(), clock.new_flag()
+        self._outdated = clock.new_flag()
+        skin = SKIN * scene.mesh.spacing if scene.large_displacements else 0.0
+        self.motion = SmallMotion(body)
         if scene.large_displacements:
-            skin = SKIN * scene.mesh.spacing
-            self.motion = scene.numerics.scheme.motion(body, skin=skin, outdated=self._outdated)
+            moving = scene.numerics.scheme.motion
+            self.motion = moving(body, skin=skin, outdated=self._outdated, faults=clock.faults)
         search = Search(support=scene.numerics.smoothing.support, spacing=scene.mesh.spacing, skin=skin)
         self._auxiliary = Neighbours(body.space, launcher, targets=auxiliary, sources=nodes, search=search)
         self._nodes = Neighbours(body.space, launcher, targets=nodes, sources=auxiliary, search=search)

@@ -5,7 +5,7 @@ waves and leaves the checkerboard alone.
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 
 import warp as wp
 
@@ -14,6 +14,7 @@ from ..materials.law import Law
 from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.motion import Motion, half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import NeighbourSums, batch_on, neighbour_sums, round_metric
+from ..operators.watch import watch_rate
 from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scheme import Scheme, wave_limit
@@ -60,6 +61,7 @@ class PublishedFluxes:
         body: the body.
         conditions: its boundary conditions.
         around_auxiliary, around_nodes: the pair lists.
+        faults: where kernels note what can not be true.
 
     Attributes:
         kernels: the kernels of the two passes.
@@ -73,8 +75,9 @@ class PublishedFluxes:
         conditions: Conditions,
         around_auxiliary: PairList,
         around_nodes: PairList,
+        faults: wp.array,
     ):
-        self._body, self._conditions = body, conditions
+        self._body, self._conditions, self._faults = body, conditions, faults
         self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
         space, law = body.space, body.law
         sums = neighbour_sums(space, body.scene.numerics.smoothing, batch_on(body.launcher.device))
@@ -97,7 +100,15 @@ class PublishedFluxes:
     def to_nodes(self, dt: wp.array) -> None:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         body = self._body
-        inputs = [body.parameters, self._conditions.table, dt, self._around_nodes, body.auxiliary, body.nodes]
+        inputs = [
+            body.parameters,
+            self._conditions.table,
+            dt,
+            self._around_nodes,
+            body.auxiliary,
+            body.nodes,
+            self._faults,
+        ]
         body.launcher.launch(self._to_nodes, body.nodes.point, inputs)
 
 
@@ -135,6 +146,7 @@ def _to_nodes_kernel(
     conditions: ConditionTypes,
 ):
     phi, metric_of, rate = space.phi, round_metric(space), wave_rate(space, law.Parameters)
+    watch = watch_rate(space)
 
     @forward_kernel
     def to_nodes(
@@ -145,6 +157,7 @@ def _to_nodes_kernel(
         pairs: PairList,
         auxiliary: space.types.AuxiliaryNodes,
         nodes: space.types.MaterialNodes,
+        faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
         dt, point = time_step[0], nodes.point[i]
@@ -157,18 +170,31 @@ def _to_nodes_kernel(
         v_half = phi.velocity(phi_half)
         sigma_adv = phi.stress(point.phi) + dt * phi.stress(minus_div_f)  # 10a
         v_adv = advance_velocity(phi.velocity(point.phi), v_half, phi.velocity(minus_div_f), dt)  # 10b
-        nodes.point[i].phi = phi.join(v_adv, sigma_adv)
+        nodes.point[i].phi = phi.with_stress(phi.with_velocity(point.phi, v_adv), sigma_adv)
         nodes.half_velocity[i] = v_half
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
+        watch(phi.velocity_gradient(grad), dt, faults)
 
     return to_nodes
 
 
-def _published(name: str, meaning: str, advance_velocity: Callable[[Space], wp.Function]) -> Scheme:
+def published_scheme(name: str, *, meaning: str, advance_velocity: Callable[[Space], wp.Function]) -> Scheme:
+    """A scheme with the published sums and a velocity step of its own.
+
+    Args:
+        name: what `Numerics.velocity_scheme` calls it.
+        meaning: one line.
+        advance_velocity: space → Warp function (v_s, v^{n+1/2}, −div f, Δt) → v_adv of step 10b; cached.
+    """
+
+    @wraps(advance_velocity, updated=())  # a registered scheme belongs to the place that makes its step
+    def fluxes(body: Body, **more) -> PublishedFluxes:
+        return PublishedFluxes(advance_velocity, body, **more)
+
     return Scheme(
         name=name,
         meaning=meaning,
-        fluxes=lambda body, **more: PublishedFluxes(advance_velocity, body, **more),
+        fluxes=fluxes,
         motion=Motion,
         unloads=False,
         follows_cells=False,
@@ -177,5 +203,9 @@ def _published(name: str, meaning: str, advance_velocity: Callable[[Space], wp.F
     )
 
 
-BLANC_PASTOR = _published("blanc-pastor", "the published step, 2 v^{n+1/2} − v: filters waves", blanc_pastor)
-TAYLOR = _published("taylor", "the paper's complete scheme: leaves the checkerboard alone", taylor)
+BLANC_PASTOR = published_scheme(
+    "blanc-pastor", meaning="the published step, 2 v^{n+1/2} − v: filters waves", advance_velocity=blanc_pastor
+)
+TAYLOR = published_scheme(
+    "taylor", meaning="the paper's complete scheme: leaves the checkerboard alone", advance_velocity=taylor
+)

@@ -41,14 +41,24 @@ class Stepper:
         self._sources = sources(scene, self.body.law, self.body.parameters, space, launcher)
         if scene.free_surface is None:
             turns = scheme.unloads and scene.large_displacements and space.dim > 1
-            self.conditions = Conditions(scene.boundary, len(scene.mesh.nodes), space, launcher, self.clock, turns)
+            self.conditions = Conditions(
+                scene.boundary,
+                len(scene.mesh.nodes),
+                space=space,
+                launcher=launcher,
+                clock=self.clock,
+                turns=turns,
+            )
         else:
-            self.conditions = FreeSurfaceConditions(scene, self.body.nodes, space, launcher, self.clock)
+            self.conditions = FreeSurfaceConditions(
+                scene, self.body.nodes, space=space, launcher=launcher, clock=self.clock
+            )
         self.fluxes = scheme.fluxes(
             self.body,
             conditions=self.conditions,
             around_auxiliary=self.lists.around_auxiliary,
             around_nodes=self.lists.around_nodes,
+            faults=self.clock.faults,
         )
         self._recording: Recording | None = None
         self._recorded: tuple[int, ...] = ()
@@ -71,13 +81,13 @@ class Stepper:
             courant: c_p Δt/Δx of the least present spacing.
 
         Returns:
-            How many were made, at least one. When a value is not finite, the last step is the first with it.
+            How many were made, at least one. When something can not be true, the last step is the first with it.
         """
         self.clock.begin(times, dt)
         self.fluxes.set_courant(courant)
         self._record().run()
         outcome = self.clock.outcome()
-        if outcome.outdated is not None and not outcome.non_finite:
+        if outcome.outdated is not None and outcome.fault is None:
             for part in self.parts[outcome.outdated :]:
                 part.refresh()
         return outcome
@@ -85,11 +95,11 @@ class Stepper:
     def step(self) -> None:
         """Advance the nodes by the clock's Δt; the numbers are those of METHOD section 3."""
         nodes, internals, dt = self.body.nodes, self.body.internals, self.clock.time_step
-        self._sources.half_step(nodes, internals, self.clock.first_half, dt)  # 1-2
+        self._sources.half_step(nodes, internals, self.clock.first_half, dt, ends=False)  # 1-2
         self.conditions.turn(nodes, dt)
         self.fluxes.to_auxiliary(dt)  # 3-6
         self.fluxes.to_nodes(dt)  # 7-10
-        self._sources.half_step(nodes, internals, self.clock.second_half, dt)  # 11-12
+        self._sources.half_step(nodes, internals, self.clock.second_half, dt, ends=True)  # 11-12
         self.conditions.turn(nodes, dt)
         self.conditions.apply(nodes)  # 13
         self.lists.motion.move(dt)  # 14

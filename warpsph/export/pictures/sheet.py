@@ -1,4 +1,7 @@
-"""A run on one sheet: a quantity at several times, the deformation, the histories."""
+"""A run on one sheet: a quantity at several times, the deformation, the histories.
+
+It is what to look at first: whether the run did what was meant, and when it did.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Picture of a free surface: which nodes are on it, and their normals."""
+"""Picture of a free surface: which nodes the scan has found to be on it, and their normals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""How a run is looked at: one quantity on the deformed body, at the same scale and colours in every frame."""
+"""How a run is looked at: one quantity on the deformed body, at the same scale and colours in every frame.
+
+Frames can then be compared by eye, and an animation does not jump. One `View` draws whatever has a mesh, a time
+and fields: a frame that was kept, or a simulation as it is now.
+"""
 
 from __future__ import annotations
 

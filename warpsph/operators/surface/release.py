@@ -26,7 +26,7 @@ from ...scene.resolve import SMOOTH_EDGE_ANGLE
 from ...scene.scene import Scene
 from ...state.clock import Clock
 from ...state.pairs import PairList
-from ..conditions import Conditions, ConditionTypes, apply_kernel, condition_types
+from ..conditions import Conditions, ConditionTypes, apply_kernel
 from .scan import SurfaceScan, surface_types
 
 # The surface is found anew once ∫|L| dt since the last time reaches this anywhere on it: the direction from one
@@ -46,36 +46,31 @@ class FreeSurfaceConditions(Conditions):
         nodes: material nodes.
     """
 
-    def __init__(self, scene: Scene, nodes, space: Space, launcher: Launcher, clock: Clock):
+    def __init__(self, scene: Scene, nodes, *, space: Space, launcher: Launcher, clock: Clock):
         device, mesh, surface = launcher.device, scene.mesh, scene.free_surface
-        types = space.types
-        super().__init__(scene.boundary, len(mesh.nodes), space, launcher, clock)
+        super().__init__(scene.boundary, len(mesh.nodes), space=space, launcher=launcher, clock=clock)
         self._unmoved = ~surface.moved(mesh, scene.boundary)
-        self._moves, self._nodes = scene.large_displacements, nodes
-        self._scan = SurfaceScan(scene, surface.candidates(mesh, scene.boundary), nodes, space, launcher)
-        self.types = free_surface_types(space)
-        self._b = self._scan.candidates.node.shape[0]
+        self._moves = scene.large_displacements
+        candidates = surface.candidates(mesh, scene.conditions)
+        self._scan = SurfaceScan(scene, candidates, nodes=nodes, space=space, launcher=launcher)
+        self.types = free_surface_types(space, self.types)
         walls, self.table = self.table, self.types.Table()
         self.table.conditions = walls
         self.table.row = self._scan.row
-        self.table.projector = wp.zeros(self._b, dtype=types.tensor, device=device)
+        self.table.projector = wp.zeros(len(candidates), dtype=space.types.tensor, device=device)
         self.table.unloading = wp.array(_unloading(scene), dtype=space.real, device=device)
-        self._turned = wp.zeros(self._b, dtype=space.real, device=device)
+        self._turned = wp.zeros(len(candidates), dtype=space.real, device=device)
         self.outdated = clock.new_flag()
         self._kernel = apply_kernel(space, self.types)
-        self._project = _project_kernel(space)
-        self._turn = _turn_kernel(space)
+        self._project = _project_kernel(space, self.types)
+        self._turn = _turn_kernel(space, self.types)
         self.kernels = (self._kernel, self._project, self._turn, *self._scan.kernels)
 
     def refresh(self) -> None:
         """Find the free surface in the present configuration."""
-        self._scan.find(self._nodes)
-        wp.launch(
-            self._project,
-            self._b,
-            inputs=[self._scan.pairs, self._scan.candidates, self.table],
-            device=self._turned.device,
-        )
+        self._scan.refresh()
+        inputs = [self._scan.pairs, self._scan.candidates, self.table]
+        wp.launch(self._project, self._turned.shape[0], inputs=inputs, device=self._turned.device)
         self._turned.zero_()
         self.outdated.zero_()
 
@@ -105,47 +100,39 @@ class FreeSurfaceConditions(Conditions):
 
 
 @cache
-def free_surface_types(space: Space) -> ConditionTypes:
-    """The conditions' table and function, with the free surface: P of each candidate after all else."""
-    phi, walls = space.phi, condition_types(space)
-    velocity_of, stress_of, join = phi.velocity, phi.stress, phi.join
-    kin, types, dim, real = (
-        space.stress,
-        space.types,
-        space.dim,
-        space.real,
-    )
-    apply_walls, transform, spherical = walls.apply, kin.transform, kin.spherical
-    stress, tensor = types.stress, types.tensor
-
-    @wp.func
-    def in_space(sigma: stress):
-        """σ11 + … + σdd."""
-        total = real(0.0)
-        for k in range(wp.static(dim)):
-            total += sigma[k]
-        return total
+def free_surface_types(space: Space, walls: ConditionTypes) -> ConditionTypes:
+    """The walls' table and function, with the free surface: P of each candidate after all else."""
+    phi, types, real = space.phi, space.types, space.real
 
     @wp.struct
     class Table:
         conditions: walls.Table
         row: wp.array(dtype=wp.int32)
-        projector: wp.array(dtype=space.mat(space.dim, space.dim))
-        unloading: wp.array(dtype=space.real)
+        projector: wp.array(dtype=types.tensor)
+        unloading: wp.array(dtype=real)
 
     @wp.func
-    def released(sigma: stress, P: tensor, unloading: wp.array(dtype=real)):
-        left = transform(sigma, P)
+    def in_space(sigma: types.stress):
+        """σ11 + … + σdd."""
+        total = real(0.0)
+        for k in range(wp.static(space.dim)):
+            total += sigma[k]
+        return total
+
+    @wp.func
+    def released(sigma: types.stress, P: types.tensor, unloading: wp.array(dtype=real)):
+        left = space.stress.transform(sigma, P)
         lost = in_space(sigma) - in_space(left)
-        taken = dim - wp.int32(wp.trace(P) + real(0.5))
-        return left - unloading[taken] * lost * transform(spherical(real(1.0)), P)
+        taken = wp.static(space.dim) - wp.int32(wp.trace(P) + real(0.5))
+        return left - unloading[taken] * lost * space.stress.transform(space.stress.spherical(real(1.0)), P)
 
     @wp.func
     def apply(i: int, values: phi.phi, when: int, table: Table):
-        result = apply_walls(i, values, when, table.conditions)
+        result = walls.apply(i, values, when, table.conditions)
         c = table.row[i]
         if c >= 0:
-            result = join(velocity_of(result), released(stress_of(result), table.projector[c], table.unloading))
+            sigma = released(phi.stress(result), table.projector[c], table.unloading)
+            result = phi.with_stress(result, sigma)
         return result
 
     return ConditionTypes(Table, apply)
@@ -153,36 +140,34 @@ def free_surface_types(space: Space) -> ConditionTypes:
 
 def _unloading(scene: Scene) -> list[float]:
     """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
-    material, dim = scene.material, scene.mesh.dim
+    continuum = scene.mesh.continuum
     if not scene.numerics.scheme.unloads:
-        return [0.0] * (dim + 1)
-    lame, shear = material.lame_modulus, material.shear_modulus
-    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, dim + 1))]
+        return [0.0] * (continuum.dim + 1)
+    stiffness, k = scene.material.stiffness(continuum), continuum.pairs.index((0, 1))
+    lame, shear = float(stiffness[0, 1]), float(stiffness[k, k])
+    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, continuum.dim + 1))]
 
 
 @cache
-def _project_kernel(space: Space):
-    types, surface = space.types, surface_types(space)
-    real, vector, tensor, dim = space.real, types.vector, types.tensor, space.dim
-    Table, Candidates = free_surface_types(space).Table, surface.Candidates
-    on_face, weights = surface.on_face, wendland_c2(space.precision)
-    identity, same_face, smooth = tensor(np.eye(dim)), math.cos(SMOOTH_EDGE_ANGLE), math.cos(HALF_EDGE)
+def _project_kernel(space: Space, conditions: ConditionTypes):
+    types, real, surface, weights = space.types, space.real, surface_types(space), wendland_c2(space.precision)
+    identity, same_face, smooth = types.tensor(np.eye(space.dim)), math.cos(SMOOTH_EDGE_ANGLE), math.cos(HALF_EDGE)
 
     @wp.func
-    def faces_of(c: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
+    def faces_of(c: int, pairs: PairList, row: wp.array(dtype=wp.int32), candidates: surface.Candidates):
         """Normals of the smooth faces that meet at c, not normalised, one a row; zero rows are left."""
         x, h = candidates.point[c].x, candidates.smoothing_length[c]
-        faces = tensor()
+        faces = types.tensor()
         count = wp.int32(0)
         for k in range(pairs.start[c], pairs.start[c + 1]):
-            o = on_face(c, k, pairs, row, candidates)
+            o = surface.on_face(c, k, pairs, row, candidates)
             if o >= 0 and candidates.sharp[o] == 0:
                 normal = candidates.normal[o]
                 face = count
                 for f in range(count):
                     if wp.dot(normal, wp.normalize(faces[f])) > real(same_face):
                         face = f
-                if face < wp.static(dim):
+                if face < wp.static(space.dim):
                     p = (candidates.point[o].x - x) / h
                     w, _ = weights(wp.dot(p, p))
                     faces[face] = faces[face] + w * normal
@@ -192,7 +177,7 @@ def _project_kernel(space: Space):
         return faces
 
     @wp.func
-    def without(projector: tensor, normal: vector):
+    def without(projector: types.tensor, normal: types.vector):
         """The projector onto what is left of its range without its part along a face's normal."""
         part = projector * normal
         if wp.length(part) > real(PARALLEL):
@@ -201,25 +186,25 @@ def _project_kernel(space: Space):
         return projector
 
     @wp.func
-    def freed_part(face: vector, c: int, candidates: Candidates, table: Table):
+    def freed_part(face: types.vector, c: int, candidates: surface.Candidates, table: conditions.Table):
         """The part of a face's normal along the directions in which its traction must vanish."""
         wall = table.conditions.row[candidates.node[c]]
         if wall < 0:
             return face
         if wp.dot(candidates.scan_normal[c], face) > real(smooth):
-            return vector()
+            return types.vector()
         return table.conditions.velocity_projector[wall] * face
 
     @forward_kernel
-    def project(pairs: PairList, candidates: Candidates, table: Table):
+    def project(pairs: PairList, candidates: surface.Candidates, table: conditions.Table):
         c = wp.tid()
         projector = identity
         if candidates.exposed[c] == 1 and candidates.sharp[c] == 0:
             projector = without(projector, freed_part(candidates.normal[c], c, candidates, table))
         elif candidates.exposed[c] == 1:
             faces = faces_of(c, pairs, table.row, candidates)
-            mean = vector()
-            for f in range(wp.static(dim)):
+            mean = types.vector()
+            for f in range(wp.static(space.dim)):
                 face = wp.normalize(faces[f])
                 mean += face
                 projector = without(projector, freed_part(face, c, candidates, table))
@@ -230,17 +215,15 @@ def _project_kernel(space: Space):
 
 
 @cache
-def _turn_kernel(space: Space):
-    MaterialNodes, real = space.types.MaterialNodes, space.real
-    Table = free_surface_types(space).Table
-    rotation = space.algebra.rotation
+def _turn_kernel(space: Space, conditions: ConditionTypes):
+    real = space.real
 
     @forward_kernel
     def turn(
         first: int,
-        nodes: MaterialNodes,
+        nodes: space.types.MaterialNodes,
         dt: wp.array(dtype=real),
-        table: Table,
+        table: conditions.Table,
         turned: wp.array(dtype=real),
         outdated: wp.array(dtype=wp.int32),
     ):
@@ -250,7 +233,7 @@ def _turn_kernel(space: Space):
             return
         L = nodes.velocity_gradient[i]
         half = real(0.5) * dt[0]
-        R = rotation(L, half)
+        R = space.algebra.rotation(L, half)
         table.projector[c] = R * table.projector[c] * wp.transpose(R)
         turned[c] += half * wp.sqrt(wp.ddot(L, L))
         if turned[c] > real(LARGEST_TURN):

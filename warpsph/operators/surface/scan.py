@@ -66,16 +66,15 @@ class SurfaceTypes:
 def surface_types(space: Space) -> SurfaceTypes:
     """The types of one continuum in one precision."""
     types, real = space.types, space.real
-    vector = types.vector
 
     @wp.struct
     class Candidates:
         node: wp.array(dtype=wp.int32)
         point: wp.array(dtype=types.Point)
         smoothing_length: wp.array(dtype=real)
-        scan_normal: wp.array(dtype=vector)
+        scan_normal: wp.array(dtype=types.vector)
         exposed: wp.array(dtype=wp.int32)
-        normal: wp.array(dtype=vector)
+        normal: wp.array(dtype=types.vector)
         sharp: wp.array(dtype=wp.int32)
 
     @wp.func
@@ -102,15 +101,15 @@ class SurfaceScan:
         nodes: material nodes.
 
     Attributes:
-        candidates: the candidates, as a `Candidates` struct, filled by `find`.
+        candidates: the candidates, as a `Candidates` struct, filled by `refresh`.
         row: which candidate each node is, −1 for none, shape (n,).
         pairs: all nodes around each candidate, as far as the scan reaches.
         kernels: the kernels that find the surface.
     """
 
-    def __init__(self, scene: Scene, candidates: np.ndarray, nodes, space: Space, launcher: Launcher):
+    def __init__(self, scene: Scene, candidates: np.ndarray, *, nodes, space: Space, launcher: Launcher):
         n, b = len(scene.mesh.nodes), len(candidates)
-        device = launcher.device
+        device, self._nodes = launcher.device, nodes
         row = np.full(n, -1, dtype=np.int32)
         row[candidates] = np.arange(b, dtype=np.int32)
         self.row = wp.array(row, dtype=wp.int32, device=device)
@@ -128,9 +127,9 @@ class SurfaceScan:
         if not self._improves:
             self.candidates.normal = self.candidates.scan_normal
 
-    def find(self, nodes) -> None:
+    def refresh(self) -> None:
         """Scan the present configuration: which candidates are exposed, and with which normals."""
-        b, device = self.candidates.node.shape[0], self.row.device
+        b, device, nodes = self.candidates.node.shape[0], self.row.device, self._nodes
         wp.launch(self._gather, b, [self._ratio, nodes, self.candidates], device=device)
         self._around.build()
         wp.launch(self._scan, b, [self.pairs, nodes, self.candidates], device=device)
@@ -155,11 +154,10 @@ def _candidates(indices, space: Space, device: wp.Device):
 
 @cache
 def _gather_kernel(space: Space):
-    real, MaterialNodes = space.real, space.types.MaterialNodes
-    Candidates = surface_types(space).Candidates
+    real = space.real
 
     @forward_kernel
-    def gather(ratio: real, nodes: MaterialNodes, candidates: Candidates):
+    def gather(ratio: real, nodes: space.types.MaterialNodes, candidates: surface_types(space).Candidates):
         c = wp.tid()
         i = candidates.node[c]
         candidates.point[c] = nodes.point[i]
@@ -171,14 +169,12 @@ def _gather_kernel(space: Space):
 
 @cache
 def _scan_kernel(space: Space):
-    types, Candidates = space.types, surface_types(space).Candidates
-    real, vector, tensor, MaterialNodes = space.real, types.vector, types.tensor, types.MaterialNodes
-    weights, inverse = wendland_c2(space.precision), space.algebra.symmetric_inverse
+    types, real, weights = space.types, space.real, wendland_c2(space.precision)
 
     @wp.func
-    def scan_normal(x: vector, h: real, start: int, end: int, pairs: PairList, nodes: MaterialNodes):
-        a = tensor()
-        sum_grad_w = vector()
+    def scan_normal(x: types.vector, h: real, start: int, end: int, pairs: PairList, nodes: types.MaterialNodes):
+        a = types.tensor()
+        sum_grad_w = types.vector()
         for k in range(start, end):
             j = pairs.index[k]
             r = nodes.point[j].x - x
@@ -188,10 +184,10 @@ def _scan_kernel(space: Space):
                 grad_w = (g * nodes.volume[j]) * r
                 a += wp.outer(grad_w, r)
                 sum_grad_w += grad_w
-        return wp.normalize(-(inverse(a) * sum_grad_w))
+        return wp.normalize(-(space.algebra.symmetric_inverse(a) * sum_grad_w))
 
     @wp.func
-    def in_scan_region(r: vector, n: vector, h: real):
+    def in_scan_region(r: types.vector, n: types.vector, h: real):
         reach = real(SCAN_EDGE) * h
         height = wp.dot(n, r)
         side = wp.length(r - height * n)
@@ -201,7 +197,7 @@ def _scan_kernel(space: Space):
         return above * above + side * side < reach * reach
 
     @forward_kernel
-    def scan(pairs: PairList, nodes: MaterialNodes, candidates: Candidates):
+    def scan(pairs: PairList, nodes: types.MaterialNodes, candidates: surface_types(space).Candidates):
         c = wp.tid()
         x, h = candidates.point[c].x, candidates.smoothing_length[c]
         start, end = pairs.start[c], pairs.start[c + 1]
@@ -220,23 +216,21 @@ def _scan_kernel(space: Space):
 @cache
 def _fit_kernel(space: Space):
     """The kernel that fits normals to the neighbours on the surface."""
-    types, surface = space.types, surface_types(space)
-    real, vector, tensor = space.real, types.vector, types.tensor
-    Candidates, on_face, weights = surface.Candidates, surface.on_face, wendland_c2(space.precision)
+    types, real, surface, weights = space.types, space.real, surface_types(space), wendland_c2(space.precision)
     # Where two faces meet, all directions rise (or all fall) by half the angle between the faces; in a solid those
     # across the edge do, 2/π as much in the mean over all directions.
     sharp_rise = math.sin(0.5 * SMOOTH_EDGE_ANGLE) * (1.0 if space.dim == 2 else 2.0 / math.pi)
-    identity = tensor(np.eye(space.dim))
+    identity = types.tensor(np.eye(space.dim))
 
     @forward_kernel
-    def fit(pairs: PairList, row: wp.array(dtype=wp.int32), candidates: Candidates):
+    def fit(pairs: PairList, row: wp.array(dtype=wp.int32), candidates: surface.Candidates):
         c = wp.tid()
         x, h, n = candidates.point[c].x, candidates.smoothing_length[c], candidates.scan_normal[c]
-        directions = tensor()  # Σ w p̂ p̂
-        offset = vector()  # Σ w p
+        directions = types.tensor()  # Σ w p̂ p̂
+        offset = types.vector()  # Σ w p
         spread, distance = real(0.0), real(0.0)  # Σ w |p|², Σ w |p|
         for k in range(pairs.start[c], pairs.start[c + 1]):
-            o = on_face(c, k, pairs, row, candidates)
+            o = surface.on_face(c, k, pairs, row, candidates)
             if o >= 0:
                 p = (candidates.point[o].x - x) / h
                 s = wp.dot(p, p)

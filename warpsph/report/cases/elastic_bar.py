@@ -66,30 +66,15 @@ def section(results, picture) -> Section:
         )
     )
     sigma = p.density * speed * p.velocity
+
+    def row(check: str, unit: str, paper: float | str, **others) -> Row:
+        return Row(check, bar.check(check.replace(" ", "_")), unit=unit, paper=paper, **others)
+
     rows = [
-        Row(
-            "worst velocity plateau",
-            bar.check("worst_velocity_plateau"),
-            unit="m/s",
-            paper=1.0,
-            exact=p.velocity,
-            seconds=bar.seconds,
-        ),
-        Row(
-            "worst stress plateau",
-            bar.check("worst_stress_plateau"),
-            unit="Pa",
-            paper="±4e5",
-            exact=f"0, {sigma:.4g} or 8e5",
-        ),
-        Row(
-            "largest displacement",
-            bar.check("largest_displacement"),
-            unit="m",
-            paper=0.001,
-            exact=2.0 * module.POINT / speed,
-        ),
-        Row("smallest displacement", bar.check("smallest_displacement"), unit="m", paper=0.0, exact=0.0),
+        row("worst velocity plateau", "m/s", 1.0, exact=p.velocity, seconds=bar.seconds),
+        row("worst stress plateau", "Pa", "±4e5", exact=f"0, {sigma:.4g} or 8e5"),
+        row("largest displacement", "m", 0.001, exact=2.0 * module.POINT / speed),
+        row("smallest displacement", "m", 0.0, exact=0.0),
     ]
     return Section(
         prose=prose("elastic_bar"),

@@ -46,22 +46,8 @@ def section(results, picture) -> Section:
     return Section(
         prose=prose("hanging_bar"),
         rows=[
-            Row(
-                "checkerboard of v_y, complete scheme",
-                left[0],
-                unit="m/s",
-                paper="visible",
-                exact=0.0,
-                seconds=complete.seconds,
-            ),
-            Row(
-                "checkerboard of v_y, published step",
-                left[1],
-                unit="m/s",
-                paper="none visible",
-                exact=0.0,
-                seconds=published.seconds,
-            ),
+            _checkerboard("complete scheme", left[0], paper="visible", seconds=complete.seconds),
+            _checkerboard("published step", left[1], paper="none visible", seconds=published.seconds),
             Row("ratio of the two", left[0] / left[1], unit="-"),
             Row("deepest tip, complete scheme", float(complete.history["tip"].min()), unit="m", exact=2.0 * rest),
             Row("deepest tip, published step", float(published.history["tip"].min()), unit="m", exact=2.0 * rest),
@@ -72,6 +58,10 @@ def section(results, picture) -> Section:
         ],
         results=[complete, published],
     )
+
+
+def _checkerboard(scheme: str, left: float, **others) -> Row:
+    return Row(f"checkerboard of v_y, {scheme}", left, unit="m/s", exact=0.0, **others)
 
 
 def _panel(title, result) -> Panel:

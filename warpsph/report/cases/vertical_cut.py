@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -74,31 +75,20 @@ def section(results, picture) -> Section:
     )
     formed, loads = _formed(perfect)
     softened = soft.history["load"]
+    load, angle = partial(Row, unit="N/m", exact=exact), partial(Row, unit="°", paper=45.0, exact=45.0)
     rows = [
-        Row(
-            "limit load, mean from 0.05 to 0.15 m",
-            float(loads.mean()),
-            unit="N/m",
-            paper=PAPER_LOADS,
-            exact=exact,
-            seconds=perfect.seconds,
+        load(
+            "limit load, mean from 0.05 to 0.15 m", float(loads.mean()), paper=PAPER_LOADS, seconds=perfect.seconds
         ),
-        Row("load at 0.05 m", float(loads[0]), unit="N/m", paper=PAPER_LOADS, exact=exact),
-        Row("load at 0.15 m", float(loads[-1]), unit="N/m", paper=PAPER_LOADS, exact=exact),
-        Row("limit load over the footing's width", perfect.check("limit_load"), unit="N/m", exact=exact),
-        Row("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load"), unit="N/m", exact=exact),
-        Row("band angle, perfectly viscoplastic", perfect.check("band_angle"), unit="°", paper=45.0, exact=45.0),
-        Row(
-            "band angle, softening",
-            soft.check("band_angle"),
-            unit="°",
-            paper=45.0,
-            exact=45.0,
-            seconds=soft.seconds,
-        ),
+        load("load at 0.05 m", float(loads[0]), paper=PAPER_LOADS),
+        load("load at 0.15 m", float(loads[-1]), paper=PAPER_LOADS),
+        load("limit load over the footing's width", perfect.check("limit_load")),
+        load("highest, 0.05 to 0.15 m, over its width", perfect.check("highest_load")),
+        angle("band angle, perfectly viscoplastic", perfect.check("band_angle")),
+        angle("band angle, softening", soft.check("band_angle"), seconds=soft.seconds),
         Row("largest strain, perfectly viscoplastic", perfect.check("largest_strain"), unit="-", paper=0.73),
         Row("largest strain, softening", float(soft.at("equivalent_plastic_strain").max()), unit="-", paper=0.89),
-        Row("peak load, softening", float(softened.max()), unit="N/m", exact=exact),
+        load("peak load, softening", float(softened.max())),
         Row("load at the end, softening", float(softened[-1]), unit="N/m", paper="falls"),
     ]
     above = formed[loads > 1.1 * exact]
