@@ -7,7 +7,7 @@ BIN = $(VENV)/bin
 .PHONY: demo test test-long gpu lint clean
 
 demo: $(VENV)/demo
-	$(BIN)/warpsph run strip_footing --out $(OUT)
+	$(BIN)/warpsph run strip_footing --out $(OUT) --overwrite
 	@echo "pictures: $(OUT)/history.png (load against settlement) and $(OUT)/field.png (plastic strain)"
 
 test: $(VENV)/test

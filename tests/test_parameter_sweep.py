@@ -6,12 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from warpsph.cli.main import main
 from warpsph.cli.member import Member, last_line
-from warpsph.cli.sweep import members
+from warpsph.cli.queue import make_missing
+from warpsph.cli.sweep import folder_name, members
 from warpsph.errors import SceneError
 
 # A bar of ten cells whose end moves; `fault` is what goes wrong, and when.
@@ -204,6 +206,57 @@ def test_dask_that_is_not_installed_is_said(bar, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert sweep("--dask", "tcp://127.0.0.1:1") == 2
     assert "pip install distributed" in capsys.readouterr().err
+
+
+class FirstOnly(ThreadPoolExecutor):
+    """Is told of runs, and ends the sweep at the first one."""
+
+    def submit(self, task, *arguments):
+        raise KeyboardInterrupt
+
+
+def test_sweep_of_a_hundred_thousand_members_begins_at_once(bar, tmp_path, capsys):
+    """Each is known by its own name, and the first is handed out within seconds, with a line before."""
+    begin = time.perf_counter()
+    values = ",".join(str(k) for k in range(400)), ",".join(repr(k / 256) for k in range(1, 251))
+    found = members(bar, [f"velocity={values[0]}", f"courant={values[1]}"], "float64")
+    assert len({member.name for member in found}) == len(found) == 100_000
+    with pytest.raises(KeyboardInterrupt):
+        make_missing(found, tmp_path / "runs", "cpu", FirstOnly(1), quiet=False)
+    assert time.perf_counter() - begin < 10.0
+    assert capsys.readouterr().out.startswith(
+        "100000 runs; looking for what is done already\n100000 runs, 0 of them"
+    )
+
+
+def test_values_that_print_alike_or_are_paths_have_folders_of_their_own(bar, tmp_path):
+    """Each once, by names that are none but their own, none of which leads elsewhere."""
+    texts = ["a/b", "a_b", "a b", "../a", "..", "é", "e\u0301", "x" * 300, "x" * 301]
+    names = [folder_name((f"mode={text}",)) for text in texts]
+    assert len(set(names)) == len(texts) and all(len(name) <= 120 and "/" not in name for name in names)
+    assert folder_name(("velocity=1", "courant=0.5")) == "velocity=1,courant=0.5"
+    assert [member.name for member in members(bar, ["velocity=1,1.0,1,1e0"], "float64")] == [
+        "velocity=1",
+        "velocity=1.0",
+        "velocity=1e0",
+    ]
+
+
+def test_history_that_is_not_its_summary_s_is_made_again(bar, tmp_path):
+    """One that lacks its last rows would give the figures of another time."""
+    asked = ("--set", "velocity=1", "--out", "out", "--quiet")
+    assert sweep(*asked) == 0
+    path = tmp_path / "out" / "runs" / "velocity=1" / "history.csv"
+    whole = path.read_bytes()
+    path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-3]))
+    assert sweep(*asked) == 0 and path.read_bytes() == whole
+    path.with_name("summary.json").write_text("{")
+    assert sweep(*asked) == 1
+    row = table(tmp_path / "out")["velocity=1"]
+    assert (
+        row["status"] == "failed to run" and "summary.json' is not allowed: it can not be read" in row["message"]
+    )
+    assert path.read_bytes() == whole, "what can not be read is not made again"
 
 
 def test_member_without_a_log_says_so(tmp_path):

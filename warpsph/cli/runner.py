@@ -42,6 +42,8 @@ from .run_folder import (
 from .settings import Settings
 from .stored import StoredScene, store
 
+SHORTEST = 1e-12  # of a time step: what is shorter changes nothing, and its square is no number any more
+
 
 class ClosingObserver(Observer, Protocol):
     """An observer that finishes its work when the run ends, however it ends."""
@@ -167,7 +169,8 @@ def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
             for probe in scene.output.probes:
                 _check_probe(probe, probe.function(simulation))
     if settings.until is not None:
-        number("until", settings.until, at_least=simulation.time)
+        shortest = SHORTEST * simulation.time_step_limit
+        number("until", settings.until, at_least=simulation.time if simulation.steps else shortest)
     where = simulation.device.alias + (f", {simulation.threads} threads" if simulation.threads > 1 else "")
     say(
         f"{scene.name}: {len(simulation.mesh.nodes)} nodes, {len(simulation.mesh.cells)} auxiliary nodes, "

@@ -66,7 +66,7 @@ def corner_share(courant: float, dim: int, reach: float) -> float:
     """
     if dim == 1 or reach > WIDEST:
         return 0.0
-    if courant <= 0.0:
+    if courant**2 <= 0.0:  # also of a step so short that its square is nothing
         return 1.0
     theta = MARGIN * 0.5 * VELOCITY_SHARE
     undamped = (2.0 if dim == 2 else 1.5) * (1.0 - courant**2)

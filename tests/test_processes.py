@@ -1,0 +1,151 @@
+"""Signals, parents and streams: what a command does when the world around it goes."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.damaging import SCENE
+from tests.killing_commands import NUMBER, having
+from tests.test_owner import SLOW
+from warpsph.cli.streams import Steady
+
+COMMAND = [sys.executable, "-m", "warpsph"]
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_SIGNAL", "yes")
+    Path("plate.py").write_text(SCENE)
+    Path("slow.py").write_text(SLOW)
+
+
+def begun(*arguments, **options):
+    """A command whose run has taken its first steps."""
+    start = [*COMMAND, *arguments, "--device", "cpu"]
+    process = subprocess.Popen(start, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, **options)
+    limit = time.monotonic() + 90.0
+    while time.monotonic() < limit and process.poll() is None:
+        if any(path.read_bytes().count(b"\n") > 3 for path in Path().rglob("history.csv")):
+            break
+        time.sleep(0.05)
+    return process
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+def test_terminal_that_closes_ends_a_run_with_a_checkpoint(number):
+    process = begun("run", "slow.py", "--out", "out")
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert re.fullmatch(r"warpsph: stopped after step \d+, .*go on with: warpsph run --resume out\n", errors)
+    assert Path("out/checkpoint.npz").is_file() and Path("out/summary.json").is_file()
+
+
+def test_run_under_nohup_ignores_the_terminal():
+    process = begun(
+        "run", "slow.py", "--out", "out", preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    )
+    process.send_signal(signal.SIGHUP)
+    time.sleep(1.0)
+    assert process.poll() is None
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it looks for processes in /proc")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_runs_of_a_sweep_end_with_it_and_keep_a_checkpoint(number):
+    mark = f"sweep-{os.getpid()}-{number}"
+    process = begun(
+        "sweep", "slow.py", "--set", "courant=0.5,0.6", "--out", "out", env=os.environ | {NUMBER: mark}
+    )
+    assert len(having(mark)) == 3
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    limit = time.monotonic() + 30.0
+    while having(mark) and time.monotonic() < limit:
+        time.sleep(0.1)
+    assert having(mark) == []
+    assert len(list(Path("out").rglob("checkpoint.npz"))) >= 1
+
+
+STREAMS = {
+    "no error stream": "2>&-",
+    "no output": ">&-",
+    "none at all": "<&- >&- 2>&-",
+    "full output": ">/dev/full",
+    "both full": ">/dev/full 2>/dev/full",
+    "a reader that has gone": "| true",
+}
+
+
+@pytest.mark.parametrize("redirection", STREAMS.values(), ids=STREAMS)
+def test_streams_that_are_closed_or_full_do_not_end_a_run(redirection):
+    line = f"{sys.executable} -m warpsph run plate.py --device cpu --out out {redirection}"
+    subprocess.run(["bash", "-c", f"set -o pipefail; {line}"], check=True, timeout=120, stdout=subprocess.DEVNULL)
+    history = Path("out/history.csv").read_bytes()
+    assert history.startswith(b"step [-],time [s],width [m]\r\n") and Path("out/summary.json").is_file()
+    assert all(row.count(b",") == 2 for row in history.splitlines()), "nothing else was written into it"
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"LANG": "C", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        {"PYTHONIOENCODING": "ascii"},
+        {"HOME": "/nowhere", "TMPDIR": "/nowhere", "MPLCONFIGDIR": "/nowhere"},
+    ],
+    ids=["locale", "encoding", "folders"],
+)
+def test_environment_that_lacks_something_does_not_end_a_run(changed):
+    done = subprocess.run(
+        [*COMMAND, "run", "plate.py", "--device", "cpu", "--out", "out"],
+        env=os.environ | changed,
+        capture_output=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0 and b"Traceback" not in done.stderr, done.stderr
+
+
+def test_letters_that_a_stream_can_not_show_are_written_otherwise(tmp_path):
+    with (tmp_path / "out").open("w", encoding="ascii") as file:
+        Steady(file).write("Δt = 3 µs…")
+    assert (tmp_path / "out").read_text() == r"\u0394t = 3 \xb5s\u2026"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("run", ""), "scene = ''"),
+        (("run", "plate.py", "--threads", "1" + "0" * 20), "--threads = .*at most 1024"),
+        (("run", "plate.py", "--frames", "1" + "0" * 20), "--frames = .*at most 999999"),
+        (("run", "plate.py", "--out", "a\nb"), "argument = 'a\\\\nb' .*without control characters"),
+        (("run", "plate.py", "--out", b"\xff"), r"argument = '\\udcff' .*UTF-8"),
+        (("run", "deep.toml"), "nested too deep"),
+        (("sweep", "plate.py", "--jobs", "1" + "0" * 20), "--jobs = .*below 1025"),
+    ],
+)
+def test_arguments_that_nobody_means_are_refused_in_one_line(arguments, message):
+    Path("deep.toml").write_text("a = " + "[" * 3000 + "]" * 3000)
+    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and re.search(message, done.stderr), done.stderr
+
+
+@pytest.mark.parametrize("until", ["1e-300", "5e-324", "1e-9"])
+def test_any_time_above_zero_is_an_end_or_refused(until):
+    done = subprocess.run(
+        [*COMMAND, "run", "plate.py", "--until", until, "--device", "cpu", "--out", "out"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr.count("\n")) == ((0, 0) if until == "1e-9" else (2, 1)), done.stderr
