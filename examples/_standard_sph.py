@@ -37,7 +37,7 @@ class StandardSPH:
         self._lame, self._shear = material.lame_modulus, material.shear_modulus
         self._held = scene.boundary.nodes[scene.boundary.moved]
         self._start, self._size = mesh.nodes, np.ptp(mesh.nodes, axis=0).max()
-        self._dt = COURANT * mesh.smallest_edge() / material.wave_speed(2)
+        self._dt = COURANT * mesh.smallest_distance() / material.wave_speed(2)
 
     def run(self, until, observe):
         """Advance to a time [s]; call `observe(self)` at the start and after every step; stop when it fails."""

@@ -112,10 +112,10 @@ class _Plain:
 
 
 def _timed(function, phase: str, spent: dict[str, float], device: wp.Device):
-    def timed(*arguments):
+    def timed(*arguments, **options):
         wp.synchronize_device(device)
         begin = time.perf_counter()
-        result = function(*arguments)
+        result = function(*arguments, **options)
         wp.synchronize_device(device)
         spent[phase] += time.perf_counter() - begin
         return result

@@ -4,6 +4,7 @@ d_vp = γ ⟨(q − Y)/Y⟩ᴺ ∂q/∂σ, dε̄/dt = γ ⟨(q − Y)/Y⟩ᴺ, Y
 the only internal variable.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -52,9 +53,9 @@ class PerzynaVonMises(Elastic):
         ),
     )
 
-    def __post_init__(self):
-        super().__post_init__()
-        self.require("hardening", above=-self.young_modulus)
+    def bounds(self, name: str) -> Mapping[str, float]:
+        """Those of the hardening follow from the stiffness: with less the stress would snap back."""
+        return {"above": -self.young_modulus} if name == "hardening" else super().bounds(name)
 
     def flow_rate(self, dim: int) -> float:
         """Fastest rate of the overstress in slow loading [1/s]: at q = 2Y, where N > 1 is as stiff as it gets."""

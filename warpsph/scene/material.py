@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import partial
 from typing import ClassVar
@@ -79,7 +79,11 @@ class Material(ABC):
     def __post_init__(self):
         for entry in fields(self):
             if "bounds" in entry.metadata:
-                self.require(entry.name, **entry.metadata["bounds"])
+                self.require(entry.name, **self.bounds(entry.name))
+
+    def bounds(self, name: str) -> Mapping[str, float]:
+        """Bounds of a parameter; those of the parameters before it are checked already."""
+        return type(self).__dataclass_fields__[name].metadata["bounds"]
 
     def require(self, name: str, **bounds: float) -> None:
         """Refuse a parameter that is no finite number within bounds `above`, `below`, `at_least`, `at_most`.
