@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from warpsph import (
     BodyForce,
     Box,
+    Check,
     Disc,
+    EdgeForce,
     Elastic,
     Fixed,
     Free,
@@ -96,6 +98,17 @@ no_time_functions = st.sampled_from(
         lambda t, u: 1.0,
     ]
 )
+no_truths = st.sampled_from(
+    [
+        lambda x, y: x,
+        lambda x, y: x * 1j,
+        lambda x, y: np.full_like(x, NAN),
+        lambda x, y: np.flatnonzero(x < 9.0),
+        lambda x, y: 1,
+        lambda x, y: None,
+        lambda x, y: x[:2] > 0.0,
+    ]
+)
 nothing_of_ours = st.sampled_from([3, "Box", (), {}, Box, len, object(), lambda x, y: x, NAN])
 NAMES = {
     "left",
@@ -141,6 +154,21 @@ def condition(build):
     return in_scene("conditions", lambda value: [build(value)])
 
 
+SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+BAR = Box((8.0, 0.5), 0.25)
+CHECK = {"name": "load", "value": 1.0, "reference": 1.0, "unit": "N", "bound": 0.1}
+
+
+def _crosses(square):
+    """Whether the corners of the square stand in an order in which two sides cross: some side is a diagonal."""
+    return any(a[0] != b[0] and a[1] != b[1] for a, b in zip(square, [*square[1:], square[0]], strict=True))
+
+
+def _bent(x, y, turns):
+    angle = 2.0 * math.pi * turns / 8.0 * x
+    return (3.0 - y) * np.cos(angle), (3.0 - y) * np.sin(angle)
+
+
 # What is built, with which wrong values, and the fields that the message may name.
 WRONG = {
     "size": (
@@ -168,6 +196,31 @@ WRONG = {
         part(Polygon, {"spacing": 0.1}, "vertices"),
         st.one_of(no_vectors, nothing_of_ours, st.just([(0, 0), (1, 1)])),
         {"vertices"},
+    ),
+    "crossing vertices": (
+        part(Polygon, {"spacing": 0.1}, "vertices"),
+        st.permutations([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]).filter(_crosses),
+        {"vertices"},
+    ),
+    "repeated vertices": (
+        part(Polygon, {"spacing": 0.1}, "vertices"),
+        st.integers(0, 3).map(lambda k: [*SQUARE[: k + 1], *SQUARE[k:]]),
+        {"vertices"},
+    ),
+    "polygon spacing": (
+        part(Polygon, {"vertices": SQUARE}, "spacing"),
+        st.one_of(not_positive, st.floats(0.501, 0.999), st.floats(1.001, 1e9), st.sampled_from([0.3, 0.15, 0.7, 1e6])),
+        {"spacing"},
+    ),
+    "thin": (
+        in_scene("shape", lambda v: Box((1.0, v, 1.0), v)),
+        st.sampled_from([0.5, 0.25, 0.125]),
+        {"spacing"},
+    ),
+    "overlap": (
+        lambda turns: BAR.mapped(lambda x, y: _bent(x, y, turns)).mesh(),
+        st.floats(1.0, 3.0),
+        {"mapped.function"},
     ),
     "mapped": (
         in_scene("shape", PLATE.mapped),
@@ -240,6 +293,12 @@ WRONG = {
     "normals": (part(FreeSurface, {}, "normals"), no_names, {"FreeSurface.normals"}),
     "edge": (condition(lambda v: Fixed(edge(v))), no_names, {"edge"}),
     "where": (condition(lambda v: Fixed(where(v))), no_functions, {"where", "conditions[0]"}),
+    "no truths": (condition(lambda v: Fixed(where(v))), no_truths, {"where"}),
+    "words": (
+        lambda v: v(edge("left"), edge("top")),
+        st.sampled_from([lambda a, b: a and b, lambda a, b: a or b, lambda a, b: not a]),
+        {"selection"},
+    ),
     "region": (
         condition(lambda v: Fixed(region((0.0, 0.0), v))),
         st.one_of(no_vectors, st.just((-1.0, -1.0))),
@@ -283,6 +342,40 @@ WRONG = {
         st.sampled_from([None, "ab", (), (NAN,), (1.0,) * 4, {}]),
         {"NodeValue.near"},
     ),
+    "near the body": (
+        in_scene("output", lambda v: Output(probes=(Probe("a", "m", NodeValue("velocity", v)),))),
+        st.tuples(st.floats(2.0, 1e6), st.floats(-1e6, 1e6)),
+        {"NodeValue.near"},
+    ),
+    "force on": (
+        in_scene("output", lambda v: Output(probes=(Probe("a", "N", EdgeForce(v, 0)),))),
+        st.one_of(
+            nothing_of_ours, st.sampled_from([region((0.1, 0.1), (0.4, 0.4)), region((2.0, 2.0), (3.0, 3.0))])
+        ),
+        {"EdgeForce.on"},
+    ),
+    "force axis": (
+        in_scene("output", lambda v: Output(probes=(Probe("a", "N", EdgeForce(edge("top"), v)),))),
+        st.sampled_from([-1, 2, 3, 0.5, None, "x", True]),
+        {"EdgeForce.axis"},
+    ),
+    "long interval": (
+        in_scene("output", lambda v: Output(interval=v)),
+        st.floats(1.001, 1e300),
+        {"Output.interval"},
+    ),
+    "check value": (
+        part(Check, CHECK, "value"),
+        st.sampled_from([None, 1j, "1", [1.0], (), np.ones(2)]),
+        {"Check.value"},
+    ),
+    "check reference": (
+        part(Check, CHECK, "reference"),
+        st.sampled_from([None, 1j, "1", [1.0], 0.0]),
+        {"Check.reference"},
+    ),
+    "check bound": (part(Check, CHECK, "bound"), below_zero, {"Check.bound"}),
+    "check name": (part(Check, CHECK, "name"), no_texts, {"Check.name"}),
     "interval": (part(Output, {}, "interval"), below_zero.filter(lambda v: v is not None), {"Output.interval"}),
     "probes": (
         part(Output, {}, "probes"),
@@ -329,9 +422,9 @@ def test_a_thousand_wrong_scenes_are_refused(case):
 
 
 @pytest.mark.long
-@settings(max_examples=5000, **OPTIONS)
+@settings(max_examples=10_000, **OPTIONS)
 @given(wrong())
-def test_five_thousand_wrong_scenes_are_refused(case):
+def test_ten_thousand_wrong_scenes_are_refused(case):
     check_refusal(*case)
 
 

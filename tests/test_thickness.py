@@ -103,4 +103,4 @@ def test_cantilever_two_cells_thick_rests():
     simulation.run()
     settlement = -simulation.field("displacement")[simulation.nearest_node((1.0, 0.1)), 1]
     assert bending + shear < settlement < 2.0 * (bending + shear)
-    assert np.abs(simulation.field("velocity")).max() < 1e-3 * gravity / 8.0
+    assert np.abs(simulation.field("velocity")).max() < 0.02 * gravity / 8.0

@@ -199,7 +199,9 @@ def _grid_line(places: np.ndarray, axis: str, spacing: float) -> tuple[float, in
     for wall in walls[1:]:
         apart = wall - walls[0]
         cells = round(apart / spacing)
-        if abs(apart / spacing - cells) > SLACK * max(1, cells):
+        if apart <= SLACK * min(spacing, high - low):
+            continue  # the same wall but for rounding
+        if cells < 1 or abs(apart / spacing - cells) > SLACK * cells:
             allowed = (
                 f"the sides at {axis} = {walls[0]:g} and {wall:g} m must be a whole number of spacings apart, "
                 f"for example {apart / max(1, cells):.6g}"
