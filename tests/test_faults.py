@@ -252,7 +252,7 @@ FIELDS = {
     "displacement": lambda s: (s.nodes.displacement, ...),
     "density": lambda s: (s.nodes.density, ...),
     "velocity gradient": lambda s: (s.nodes.velocity_gradient, ...),
-    "plastic strain": lambda s: (s.history, ...),
+    "plastic strain": lambda s: (s.internals, ...),
     "auxiliary density": lambda s: (s.auxiliary.density, ...),
 }
 
