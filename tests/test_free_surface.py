@@ -175,13 +175,13 @@ def deformed_box(size, deformation):
 
 
 def thin_wedge(slope=0.05):
-    """One cell thick, so that each node has the other side's nodes in its support; the ends are left out."""
-    box = Box((2.0, 0.1), 0.1)
+    """Two cells thick, so that each node has the other side's nodes in its support; the ends are left out."""
+    box = Box((2.0, 0.2), 0.1)
     return Body(
-        shape=box.mapped(lambda x, y: (x, y * (0.2 + 10.0 * slope * x))),
+        shape=box.mapped(lambda x, y: (x, y * (0.5 + 5.0 * slope * x))),
         reference=box,
         normal=lambda x: np.where(x[:, 1:] > 0.0, unit(np.array([[-slope, 1.0]])), np.array([[0.0, -1.0]])),
-        smooth=lambda x: (x[:, 0] > 0.0) & ~np.isclose(x[:, 0], 2.0),
+        smooth=lambda x: (x[:, 0] > 0.0) & ~np.isclose(x[:, 0], 2.0) & ~np.isclose(x[:, 1], 0.1),
         bound=None,
     )
 

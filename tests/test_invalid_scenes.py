@@ -209,7 +209,7 @@ WRONG = {
     ),
     "polygon spacing": (
         part(Polygon, {"vertices": SQUARE}, "spacing"),
-        st.one_of(not_positive, st.floats(0.501, 0.999), st.floats(1.001, 1e9), st.sampled_from([0.3, 0.15, 0.7, 1e6])),
+        st.one_of(not_positive, st.floats(0.501, 0.999), st.floats(1.001, 1e9), st.sampled_from([0.3, 0.15, 0.7])),
         {"spacing"},
     ),
     "thin": (

@@ -23,6 +23,7 @@ from ..errors import SceneError, one_of
 from ..scene.check import Check
 from ..scene.document import decode, encode
 from ..scene.parameter import assign
+from ..scene.registry import needs_code
 from ..scene.scene import Scene
 from ..storage.files import write_text, write_whole
 from ..storage.names import name
@@ -32,7 +33,7 @@ from .catalogue import SceneFile, load, load_file
 from .run_folder import ARRAYS, COPY, SCENE
 from .settings import Settings
 
-CODE = ("file", "folder", "parameters", "sha256", "checks")
+CODE = ("file", "folder", "parameters", "sha256", "checks", "registers")
 NOTE = "# Repeat this run with: warpsph run {path}\n\n"
 
 
@@ -123,6 +124,8 @@ class StoredScene:
             return built[0]
 
         flag("code.checks", self._code.get("checks", False))
+        if flag("code.registers", self._code.get("registers", False)):
+            _ = self.source  # a material, a kernel or a scheme of its own, by name
         _ = self._file  # refused although it may not be needed
         try:
             scene = decode(document | {"name": self.name}, self._arrays(), code)
@@ -182,6 +185,7 @@ def store(
             "folder": str(neighbours),
             "sha256": hashlib.sha256(content).hexdigest(),
             "checks": checks,
+            "registers": needs_code(scene),
             "parameters": {name: "auto" if value is None else value for name, value in values.items()},
         }
     if arrays:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import SceneError
 from .material import Material
 from .scheme import SCHEMES, Scheme
 from .smoothing import SmoothingKernel
 
+if TYPE_CHECKING:
+    from .scene import Scene
+
+PACKAGE = __package__.partition(".")[0]
 MATERIALS: dict[str, type[Material]] = {}
 KERNELS: dict[str, SmoothingKernel] = {}
 
@@ -51,3 +55,10 @@ def _row(record: object) -> tuple[dict, str, str]:
 
 def _place(made_by: object) -> str:
     return f"{made_by.__module__}.{getattr(made_by, '__qualname__', made_by)}"
+
+
+def needs_code(scene: Scene) -> bool:
+    """Whether a scene names what code outside of this package has registered: a document alone can not know it."""
+    numerics = scene.numerics
+    records = (type(scene.material), KERNELS[numerics.kernel], SCHEMES[numerics.velocity_scheme])
+    return not all(_row(record)[-1].startswith(f"{PACKAGE}.") for record in records)
