@@ -292,7 +292,7 @@ def _cut(
     axes = [start + spacing * (np.arange(count) + 0.5) for start, count in zip(low, cells, strict=True)]
     kept = inside(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     covered = spacing**2 * np.count_nonzero(kept)
-    if abs(covered - area) > LARGEST_AREA_ERROR * area:
+    if abs(covered - area) > (LARGEST_AREA_ERROR + SLACK) * area:  # rounding does not decide
         allowed = f"it must be finer: the cells have {covered:.4g} m² in all, the shape {area:.4g} m²"
         raise SceneError("spacing", spacing, allowed)
     for x, y in low + spacing * hinges(kept):
