@@ -63,7 +63,14 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
     first, restored = (Simulation(scene, device, precision) for _ in range(2))
     first.run(0.05)
     restored.restore(*first.state())
-    told_of = ("body.nodes.", "body.auxiliary.", "body.node_cells.", "lists.", "fluxes._cells")
+    told_of = (
+        "body.nodes.",
+        "body.auxiliary.",
+        "body.node_cells.",
+        "lists._auxiliary.",
+        "lists._nodes.",
+        "fluxes._cells",
+    )
     every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}
     assert len(arrays) > 20
