@@ -136,7 +136,7 @@ def test_counts_of_a_bar_by_hand():
     assert "sources" not in timing.time_phases(simulation)
     assert counting.memory_per_node(simulation) > point + 3 * 8
     body, cells = small(2).stepper.body, small(2).stepper.fluxes._cells
-    assert cells.size * 8 == 16 * 22 * 8, "22 numbers of each cell"
+    assert cells.size * 8 == 16 * 23 * 8, "23 numbers of each cell"
     found: dict[int, int] = {}
     counting._collect_arrays(body.node_cells, found, set())
-    assert sum(found.values()) == (25 + 1 + 16 * 4) * 4, "the cells of 25 nodes, as 64 places in compressed rows"
+    assert sum(found.values()) == (25 + 1 + 16 * 4 + 25) * 4, "64 places in the cells of 25 nodes"

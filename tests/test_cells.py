@@ -119,7 +119,7 @@ def see(mesh, field, precision, middle_gradient=None, share=1.0):
     written = (phi, phi_gradient, phi, types.tensor)
     outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
     wp.launch(gather_all, n, [auxiliary, node_cells(mesh, "cpu"), cells, share], outputs, device="cpu")
-    gradient, frame = types.size * mesh.dim, mesh.dim**2
+    gradient, frame = types.size * mesh.dim, mesh.dim**2 + 1  # and how far strain rates may be taken
     modes = cells.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
 

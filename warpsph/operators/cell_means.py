@@ -63,15 +63,19 @@ def cell_means(space: Space, kind: CellKind, by_number: bool = False) -> CellMea
     return CellMeans(store, _describe(space, kind, store), _gather(space, kind, store))
 
 
-def corner_gradients(space: Space, kind: CellKind):
-    """∂N_k/∂ξ_a in the middle of a cell, a corner a row, as a Warp matrix."""
-    return space.mat(kind.corners, space.dim)(*np.ravel(kind.gradients).tolist())
+def corner_gradients(space: Space, kind: CellKind) -> tuple[object, float]:
+    """∂N_k/∂ξ_a in the middle of a cell as a Warp matrix, a corner a row, and a factor that is left out of it.
+
+    With the factor out a matrix of ±1 is left on a grid, and products become sums.
+    """
+    factor = float(np.abs(kind.gradients).max())
+    return space.mat(kind.corners, space.dim)(*(np.ravel(kind.gradients) / factor).tolist()), factor
 
 
 @cache
 def edges_function(space: Space, kind: CellKind) -> wp.Function:
     """(cell, auxiliary nodes, nodes) → its edges ∂x/∂ξ_a in the middle, in column a."""
-    slope = corner_gradients(space, kind)
+    slope, factor = corner_gradients(space, kind)
 
     @wp.func
     def edges_of(a: int, auxiliary: space.types.AuxiliaryNodes, nodes: wp.array(dtype=space.types.Point)):
@@ -79,7 +83,7 @@ def edges_function(space: Space, kind: CellKind) -> wp.Function:
         for k in range(wp.static(kind.corners)):
             i = auxiliary.cell[a, k]
             edges += wp.outer(nodes[i].x, slope[k])
-        return edges
+        return space.real(factor) * edges
 
     return edges_of
 
@@ -121,9 +125,27 @@ def _signs(space: Space, kind: CellKind, store: CellStore):
 
 
 @cache
+def _reach(space: Space) -> wp.Function:
+    """Frame of a cell → how far towards its corners strain rates may be taken: see `FLATTEST`; 1 for a folded one."""
+
+    @wp.func
+    def reach_of(frame: space.types.tensor):
+        least, most = wp.length_sq(frame[0]), wp.length_sq(frame[0])
+        for b in range(1, wp.static(space.dim)):
+            least = wp.min(least, wp.length_sq(frame[b]))
+            most = wp.max(most, wp.length_sq(frame[b]))
+        if most <= space.real(0.0):
+            return space.real(1.0)
+        return space.real(FLATTEST) * wp.sqrt(least / most)
+
+    return reach_of
+
+
+@cache
 def _describe(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
-    types, slope, sign = space.types, corner_gradients(space, kind), _signs(space, kind, store)
-    frame_of, position_modes = frame_function(space), space.mat(space.dim, store.columns)
+    types, sign, (slope, factor) = space.types, _signs(space, kind, store), corner_gradients(space, kind)
+    frame_of, reach_of = frame_function(space), _reach(space)
+    position_modes = space.mat(space.dim, store.columns)
     packed_points, packed_table = packed(wp.array(dtype=types.Point)), packed(wp.array2d(dtype=wp.int32))
 
     @wp.func
@@ -142,8 +164,9 @@ def _describe(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
             cell.modes += wp.outer(point.phi, sign[k])
             bends += wp.outer(point.x, sign[k])
         share = space.real(wp.static(1.0 / kind.corners))
-        cell.frame = frame_of(edges)
-        cell.modes = share * (cell.modes - slopes * (cell.frame * bends))
+        cell.frame = frame_of(space.real(factor) * edges)
+        cell.modes = share * (cell.modes - (space.real(factor) * slopes) * (cell.frame * bends))
+        cell.reach = reach_of(cell.frame)
         return share * mean, cell
 
     return describe
@@ -178,17 +201,6 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
     packed_points = packed(wp.array(dtype=types.Point))
 
     @wp.func
-    def flatness(frame: types.tensor):
-        """Least over largest distance across a cell, from |∇ξ_a|; 1 for a folded one."""
-        least, most = wp.length_sq(frame[0]), wp.length_sq(frame[0])
-        for b in range(1, wp.static(space.dim)):
-            least = wp.min(least, wp.length_sq(frame[b]))
-            most = wp.max(most, wp.length_sq(frame[b]))
-        if most <= space.real(0.0):
-            return space.real(1.0)
-        return wp.sqrt(least / most)
-
-    @wp.func
     def gather(
         i: int,
         table: NodeCells,
@@ -201,20 +213,28 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
         value, gradient, checkerboard, frame = types.phi(), types.phi_gradient(), types.phi(), types.tensor()
         beyond = types.tensor()  # what ∇v has beyond that in the middles
         first, end = table.first[i], table.first[i + 1]
-        entry = int(first)
-        for k in range(wp.static(kind.corners)):  # a node's entries are in the order of the corners it is
-            if entry < end:
-                a, corner = place_of(entry, table)
-                if corner == k:
-                    entry += 1
-                    value += auxiliary[a].phi
-                    cell = store.read(a, numbers)
-                    gradient += cell.gradient
-                    frame += cell.frame
-                    if wp.static(len(kind.modes) > 0):
-                        own = wp.min(share, space.real(FLATTEST) * flatness(cell.frame))
-                        beyond += cell.modes[: wp.static(space.dim)] * (mode_slopes(side[k], own) * cell.frame)
-                        checkerboard += cell.modes * sign[k]
+        if table.regular[i] == 1:  # the same as below, unrolled
+            for k in range(wp.static(kind.corners)):
+                a, _ = place_of(first + k, table)
+                value += auxiliary[a].phi
+                cell = store.read(a, numbers)
+                gradient += cell.gradient
+                frame += cell.frame
+                if wp.static(len(kind.modes) > 0):
+                    slopes = mode_slopes(side[k], wp.min(share, cell.reach))
+                    beyond += cell.modes[: wp.static(space.dim)] * (slopes * cell.frame)
+                    checkerboard += cell.modes * sign[k]
+        else:
+            for entry in range(first, end):
+                a, k = place_of(entry, table)
+                value += auxiliary[a].phi
+                cell = store.read(a, numbers)
+                gradient += cell.gradient
+                frame += cell.frame
+                if wp.static(len(kind.modes) > 0):
+                    slopes = mode_slopes(side[k], wp.min(share, cell.reach))
+                    beyond += cell.modes[: wp.static(space.dim)] * (slopes * cell.frame)
+                    checkerboard += cell.modes * sign[k]
         for row in range(wp.static(space.dim)):
             gradient[row] += beyond[row]
         part = space.real(1.0) / space.real(end - first)

@@ -165,10 +165,16 @@ def _share_kernel(space: Space, kind: CellKind):
         packed_auxiliary(auxiliary)
         total, h = real(0.0), real(0.0)
         begin, end = table.first[i], table.first[i + 1]
-        for entry in range(begin, end):
-            a, _ = place_of(entry, table)
-            total += auxiliary.volume[a]
-            h = wp.max(h, auxiliary.smoothing_length[a])
+        if table.regular[i] == 1:  # the same as below, unrolled
+            for k in range(wp.static(kind.corners)):
+                a, _ = place_of(begin + k, table)
+                total += auxiliary.volume[a]
+                h = wp.max(h, auxiliary.smoothing_length[a])
+        else:
+            for entry in range(begin, end):
+                a, _ = place_of(entry, table)
+                total += auxiliary.volume[a]
+                h = wp.max(h, auxiliary.smoothing_length[a])
         volume = total / real(end - begin)
         nodes.volume[i] = volume
         nodes.density[i] = nodes.weight[i] / volume
