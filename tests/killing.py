@@ -74,7 +74,7 @@ def main(folder):
 
 def check_final(whole, broken):
     with np.load(whole / "final.npz") as one, np.load(broken / "final.npz") as other:
-        for name in ("nodes.point", "auxiliary.point", "history", "nodes.displacement"):
+        for name in ("body.nodes.point", "body.auxiliary.point", "body.internals", "body.nodes.displacement"):
             assert one[name].tobytes() == other[name].tobytes(), name
 
 

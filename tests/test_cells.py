@@ -58,11 +58,11 @@ class Seen:
 
 
 @cache
-def probes(dim, precision):
+def probes(dim, precision, slots):
     """Kernels that run `describe` on all cells and `gather` on all nodes."""
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
-    types, means = space.types, cell_means(space, GRID_KINDS[dim])
+    types, means = space.types, cell_means(space, GRID_KINDS[dim], slots=slots)
     phi, phi_gradient, Point, AuxiliaryNodes = types.phi, types.phi_gradient, types.Point, types.AuxiliaryNodes
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -99,9 +99,9 @@ def probes(dim, precision):
     return describe_all, gather_all, space, means
 
 
-def see(mesh, field, precision, middle_gradient=None, share=1.0):
+def see(mesh, field, precision, middle_gradient=None, share=1.0, slots=True):
     """Run both on node values (n, d + s) and gradients in the middle of the cells (m, d + s, d)."""
-    describe_all, gather_all, space, means = probes(mesh.dim, precision)
+    describe_all, gather_all, space, means = probes(mesh.dim, precision, slots)
     types = space.types
     phi, phi_gradient, Point = types.phi, types.phi_gradient, types.Point
     n, m = len(mesh.nodes), len(mesh.cells)
@@ -118,10 +118,22 @@ def see(mesh, field, precision, middle_gradient=None, share=1.0):
     )
     written = (phi, phi_gradient, phi, types.tensor)
     outputs = [wp.full(n, dtype(np.nan), dtype=dtype, device="cpu") for dtype in written]
-    wp.launch(gather_all, n, [auxiliary, node_cells(mesh, "cpu"), cells, share], outputs, device="cpu")
-    gradient, frame = types.size * mesh.dim, mesh.dim**2 + 1  # and how far strain rates may be taken
-    modes = cells.numpy()[gradient:-frame].T.reshape(m, types.size, -1)
+    wp.launch(gather_all, n, [auxiliary, node_cells(mesh, slots, "cpu"), cells, share], outputs, device="cpu")
+    gradient, modes = types.size * mesh.dim, types.size * means.store.columns
+    modes = cells.numpy()[gradient : gradient + modes].T.reshape(m, types.size, -1)
     return Seen(auxiliary.point.numpy()["phi"], modes, *(output.numpy() for output in outputs))
+
+
+@pytest.mark.parametrize("dim", DIMENSIONS)
+def test_entries_and_slots_give_the_same(precision, dim):
+    """A mesh that is no lattice has no slots for its corners: one entry after the other, to rounding."""
+    mesh, rng = distorted(box(dim)), np.random.default_rng(4)
+    field = rng.normal(size=(len(mesh.nodes), size_of(dim)))
+    middle = rng.normal(size=(len(mesh.cells), size_of(dim), dim))
+    slots, entries = (see(mesh, field, precision, middle, 0.7, way) for way in (True, False))
+    for name in ("value", "gradient", "checkerboard", "frame"):
+        found, expected = getattr(entries, name), getattr(slots, name)
+        np.testing.assert_allclose(found, expected, atol=ROUNDING[precision] * np.abs(expected).max(initial=1.0))
 
 
 def size_of(dim):

@@ -86,7 +86,7 @@ def test_run_that_broke_down_is_kept_and_says_why(bar, tmp_path):
     broken.make(tmp_path / "broken", "cpu")
     assert broken.done(tmp_path / "broken")
     result = broken.read(tmp_path / "broken")
-    assert "non-finite" in result.summary["error"]
+    assert "must return a finite number; not nan" in result.summary["error"]
     assert len(result.times) == 2, "the frame at 10 ms was never reached"
     section = Section(Prose("t", "x", ()), [Row("q", 1.0)], [], [result])
     write_markdown(tmp_path / "r.md", [section], title="title", lead=[])

@@ -79,14 +79,14 @@ def make_scene(scheme, kernel, small_strain, sources="rk4", courant=0.5):
 
 def state_of(simulation):
     names = {
-        "x": "position",
         "v": "velocity",
         "sigma": "stress",
         "eps": "equivalent_plastic_strain",
         "rho": "density",
         "L": "velocity_gradient",
     }
-    return {key: simulation.field(name).astype(float) for key, name in names.items()}
+    x = simulation.nodes.point.numpy()["x"].astype(float) + simulation.mesh.middle  # where sums see the nodes
+    return {"x": x} | {key: simulation.field(name).astype(float) for key, name in names.items()}
 
 
 def compatible_state_of(simulation):
@@ -138,7 +138,7 @@ def model_of(scene):
         "top": edge("top").nodes(scene.mesh) & (nodes[:, 0] > 0.62),
         "top_velocity": footing,
         "x0": nodes,
-        "spacing": min(np.linalg.norm(axes_of(nodes[cell]), axis=1).min() for cell in scene.mesh.cells),
+        "spacing": min(np.linalg.svd(axes_of(nodes[cell]), compute_uv=False).min() for cell in scene.mesh.cells),
         "wave_speed": MATERIAL.wave_speed(2),
         "bare_normals": bare_normals(scene.mesh),
     }

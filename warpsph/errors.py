@@ -24,6 +24,10 @@ class SceneError(WarpSPHError, ValueError):
         super().__init__(" ".join(f"{field} = {_short(value)} is not allowed: {allowed}".split()))
 
 
+class FunctionError(SceneError):
+    """A user's function of time failed; where that is in the midst of a run, the run keeps what it has."""
+
+
 class DamagedError(SceneError):
     """A file that a run has left can not be read: it is there, and nobody may act as if it were not."""
 

@@ -9,7 +9,7 @@ from numbers import Integral, Real
 
 import numpy as np
 
-from .errors import SceneError, one_of
+from .errors import FunctionError, SceneError, one_of
 
 TimeFunction = float | Callable[[float], float]
 
@@ -131,9 +131,9 @@ class FunctionOfTime:
             raise self._refusal(t, f"not {value!r}")
         return real
 
-    def _refusal(self, t: float, said: str) -> SceneError:
+    def _refusal(self, t: float, said: str) -> FunctionError:
         rounded = float(f"{t:.6g}")
-        return SceneError(self.field, self.function, f"f({rounded}) must return a finite number; {said}")
+        return FunctionError(self.field, self.function, f"f({rounded}) must return a finite number; {said}")
 
     def __repr__(self) -> str:
         return repr(self.function)

@@ -123,7 +123,7 @@ def turned(sigma, L, time):
     return R @ sigma @ R.T
 
 
-def sources(v, sigma, eps, L, t0, half, model):
+def sources(v, sigma, eps, L, t0, half, ends, model):
     """Steps 1-2 and 11-12, by the scheme of choice for the stress. Returns v, sigma, eps."""
     v, sigma, eps = v.copy(), sigma.copy(), eps.copy()
     for i in range(len(v)):
@@ -137,7 +137,7 @@ def sources(v, sigma, eps, L, t0, half, model):
             y = np.append(sigma[i], eps[i])
             y = rk4(lambda y, t, omega=omega: stress_source(y, omega, model), y, t0, half)
             sigma[i], eps[i] = y[:4], y[4]
-        v[i] = rk4(lambda v, t: velocity_source(v, t, model), v[i], t0, half)
+        v[i] = velocity_source(v[i], t0, half, ends, model)
     return v, sigma, eps
 
 
@@ -326,17 +326,18 @@ def slow_compatible_step(state: dict, model: dict, t: float, dt: float) -> dict:
     x, L = state["x"], state["L"]
     courant = dt * model["wave_speed"] / model["spacing"]
     nodes, aux = configuration(x, state["rho"], model)
-    v_s, sigma_s, eps_s = sources(state["v"], state["sigma"], state["eps"], L, t, 0.5 * dt, model)
+    v_s, sigma_s, eps_s = sources(state["v"], state["sigma"], state["eps"], L, t, 0.5 * dt, False, model)
     cells = cells_half_step(x, nodes, aux, v_s, sigma_s, eps_s, L, dt, courant, model)
     angle = turned_edges(state["angle"], L, 0.5 * dt, model)
     v_adv, sigma_adv, v_half, L_new = nodes_full_step(
         nodes, aux, cells, v_s, sigma_s, L, angle, t, dt, courant, model
     )
-    v, sigma, eps = sources(v_adv, sigma_adv, eps_s, L_new, t + 0.5 * dt, 0.5 * dt, model)
+    v, sigma, eps = sources(v_adv, sigma_adv, eps_s, L_new, t + 0.5 * dt, 0.5 * dt, True, model)
     angle = turned_edges(angle, L_new, 0.5 * dt, model)
     v, sigma = boundary_conditions(v, sigma, angle, t + dt, model)
     new = {"v": v, "sigma": sigma, "eps": eps, "L": L_new, "angle": angle}
+    new["u"] = state["u"] + dt * v_half
     if model["small_strain"]:
-        return new | {"x": x, "u": state["u"], "rho": state["rho"]}
-    x_new, u_new = x + dt * v_half, state["u"] + dt * v_half
-    return new | {"x": x_new, "u": u_new, "rho": densities(x_new, model)}
+        return new | {"x": x, "rho": state["rho"]}
+    x_new = x + dt * v_half
+    return new | {"x": x_new, "rho": densities(x_new, model)}

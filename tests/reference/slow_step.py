@@ -189,12 +189,14 @@ def stress_source(y, omega, model):
     return np.append(components(dsigma_dt), deps_dt)
 
 
-def velocity_source(v, t, model):
-    """dv/dt = b(t) - c v."""
-    return np.asarray(model["body_force"](t), dtype=float) - model["damping"] * v
+def velocity_source(v, t0, half, ends, model):
+    """Damped by e^(-c half) and pushed by the integral of b (Simpson); pushed first in the second half."""
+    b0, b1, b2 = (np.asarray(model["body_force"](t0 + part * half), dtype=float) for part in (0.0, 0.5, 1.0))
+    push, left = half / 6.0 * (b0 + 4.0 * b1 + b2), np.exp(-model["damping"] * half)
+    return left * (v + push) if ends else left * v + push
 
 
-def steps_1_2_and_11_12_sources(v, sigma, eps, L, t0, half, model):
+def steps_1_2_and_11_12_sources(v, sigma, eps, L, t0, half, ends, model):
     """phi <- L(half) phi from t0 to t0 + half, with the spin of L frozen. Returns v, sigma, eps."""
     n = len(v)
     v_new, sigma_new, eps_new = np.zeros((n, 2)), np.zeros((n, 4)), np.zeros(n)
@@ -209,7 +211,7 @@ def steps_1_2_and_11_12_sources(v, sigma, eps, L, t0, half, model):
         y = rk4(lambda y, t, omega=omega: stress_source(y, omega, model), y, t0, half)
         sigma_new[I], eps_new[I] = y[:4], y[4]
 
-        v_new[I] = rk4(lambda v, t: velocity_source(v, t, model), v[I], t0, half)
+        v_new[I] = velocity_source(v[I], t0, half, ends, model)
     return v_new, sigma_new, eps_new
 
 
@@ -366,7 +368,7 @@ def slow_step(state: dict, model: dict, t: float, dt: float) -> dict:
     nodes = material_nodes(state, model)
     aux = auxiliary_nodes(nodes, model["cells"])
 
-    v_s, sigma_s, eps_s = steps_1_2_and_11_12_sources(v, sigma, eps, L, t, 0.5 * dt, model)
+    v_s, sigma_s, eps_s = steps_1_2_and_11_12_sources(v, sigma, eps, L, t, 0.5 * dt, False, model)
 
     v_aux, sigma_aux = step_3_value_at_aux(nodes, aux, v_s, sigma_s, model)
     v_aux_half, sigma_aux_half = steps_4_6_half_step_at_aux(nodes, aux, v_aux, sigma_aux, v_s, sigma_s, dt, model)
@@ -376,7 +378,7 @@ def slow_step(state: dict, model: dict, t: float, dt: float) -> dict:
     )
 
     v_new, sigma_new, eps_new = steps_1_2_and_11_12_sources(
-        v_adv, sigma_adv, eps_s, L_new, t + 0.5 * dt, 0.5 * dt, model
+        v_adv, sigma_adv, eps_s, L_new, t + 0.5 * dt, 0.5 * dt, True, model
     )
     v_new, sigma_new = boundary_conditions(v_new, sigma_new, t + dt, model)  # step 13
     x_new, rho_new = step_14_move(nodes, v_half, L_new, dt, model)

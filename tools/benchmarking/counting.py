@@ -44,9 +44,7 @@ TRAFFIC = {
             "body.auxiliary.point",
             "body.auxiliary.volume",
             "fluxes._cells",
-            "body.node_cells.first",
             "body.node_cells.place",
-            "body.node_cells.regular",
             "body.nodes.point",
             "body.nodes.smoothing_length",
             "body.nodes.density",
@@ -57,7 +55,7 @@ TRAFFIC = {
     ),
     "conditions": (
         1,
-        ("body.nodes.point", "body.nodes.displacement", "conditions.table.row"),
+        ("body.nodes.point", "body.nodes.displacement", "body.nodes.velocity_gradient", "conditions.table.row"),
         ("body.nodes.point",),
     ),
     "motion": (
@@ -78,9 +76,7 @@ TRAFFIC = {
             # the nodes get their share
             "body.auxiliary.volume",
             "body.auxiliary.smoothing_length",
-            "body.node_cells.first",
             "body.node_cells.place",
-            "body.node_cells.regular",
             "body.nodes.weight",
             "body.nodes.displacement",
             "lists.motion._listed",

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Protocol
 
 from .. import __version__
-from ..errors import BreakdownError, SceneError, StoppedError
+from ..errors import BreakdownError, FunctionError, SceneError, StoppedError
 from ..export.frame_files import read_about, times_of_frames
 from ..export.pictures.field import plot_field
 from ..export.pictures.history import plot_history
@@ -204,7 +204,7 @@ def _advance(course: Course, restart: Restart, watching: Sequence[Callable], sho
         ):
             simulation.run(until=course.end, observers=[*observers, checkpoints])
             course.history.sample(simulation)
-    except BreakdownError as failure:
+    except (BreakdownError, FunctionError) as failure:
         course.error = str(failure)
     except StoppedError as asked:
         course.stop = asked

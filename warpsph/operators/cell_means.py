@@ -25,7 +25,7 @@ import warp as wp
 from ..device.arrays import natural, packed
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cells import CellStore, NodeCells, cell_store, corner_place
+from ..state.cells import CellStore, NodeCells, cell_in_slot, cell_store, corner_place
 
 # A cell with less than this share of the volume of a box with edges as long has folded: it has no frame that sums
 # could follow, and ends a run whose nodes move.
@@ -57,10 +57,17 @@ def numbers_side_by_side(device: wp.Device) -> bool:
 
 
 @cache
-def cell_means(space: Space, kind: CellKind, by_number: bool = False) -> CellMeans:
-    """The means of one continuum in one precision; `by_number` as for `CellStore`."""
+def cell_means(space: Space, kind: CellKind, *, slots: bool = True, by_number: bool = False) -> CellMeans:
+    """The means of one continuum in one precision.
+
+    Args:
+        space: the continuum and the precision.
+        kind: of the cells.
+        slots: whether `NodeCells` has slots.
+        by_number: as for `CellStore`.
+    """
     store = cell_store(space, kind, by_number)
-    return CellMeans(store, _describe(space, kind, store), _gather(space, kind, store))
+    return CellMeans(store, _describe(space, kind, store), _gather(space, kind, store, slots))
 
 
 def corner_gradients(space: Space, kind: CellKind) -> tuple[object, float]:
@@ -126,7 +133,7 @@ def _signs(space: Space, kind: CellKind, store: CellStore):
 
 @cache
 def _reach(space: Space) -> wp.Function:
-    """Frame of a cell → how far towards its corners strain rates may be taken: see `FLATTEST`; 1 for a folded one."""
+    """Frame of a cell → how far towards its corners strain rates may be taken (`FLATTEST`); 1 for a folded one."""
 
     @wp.func
     def reach_of(frame: space.types.tensor):
@@ -194,10 +201,14 @@ def _mode_slopes(space: Space, kind: CellKind, columns: int) -> wp.Function:
 
 
 @cache
-def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
+def _gather(space: Space, kind: CellKind, store: CellStore, slots: bool) -> wp.Function:
     types, sign = space.types, _signs(space, kind, store)
     side = space.mat(kind.corners, space.dim)(*kind.sides.ravel().tolist())
-    mode_slopes, place_of = _mode_slopes(space, kind, store.columns), corner_place(kind)
+    mode_slopes, place_of, cell_at = (
+        _mode_slopes(space, kind, store.columns),
+        corner_place(kind),
+        cell_in_slot(kind),
+    )
     packed_points = packed(wp.array(dtype=types.Point))
 
     @wp.func
@@ -212,21 +223,24 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
         packed_points(auxiliary)
         value, gradient, checkerboard, frame = types.phi(), types.phi_gradient(), types.phi(), types.tensor()
         beyond = types.tensor()  # what ∇v has beyond that in the middles
-        first, end = table.first[i], table.first[i + 1]
-        if table.regular[i] == 1:  # the same as below, unrolled
+        found = space.real(0.0)
+        if wp.static(slots):
             for k in range(wp.static(kind.corners)):
-                a, _ = place_of(first + k, table)
-                value += auxiliary[a].phi
-                cell = store.read(a, numbers)
-                gradient += cell.gradient
-                frame += cell.frame
-                if wp.static(len(kind.modes) > 0):
-                    slopes = mode_slopes(side[k], wp.min(share, cell.reach))
-                    beyond += cell.modes[: wp.static(space.dim)] * (slopes * cell.frame)
-                    checkerboard += cell.modes * sign[k]
-        else:
-            for entry in range(first, end):
+                a = cell_at(i, k, table)
+                if a >= 0:
+                    found += space.real(1.0)
+                    value += auxiliary[a].phi
+                    cell = store.read(a, numbers)
+                    gradient += cell.gradient
+                    frame += cell.frame
+                    if wp.static(len(kind.modes) > 0):
+                        slopes = mode_slopes(side[k], wp.min(share, cell.reach))
+                        beyond += cell.modes[: wp.static(space.dim)] * (slopes * cell.frame)
+                        checkerboard += cell.modes * sign[k]
+        else:  # the same, entry by entry
+            for entry in range(table.first[i], table.first[i + 1]):
                 a, k = place_of(entry, table)
+                found += space.real(1.0)
                 value += auxiliary[a].phi
                 cell = store.read(a, numbers)
                 gradient += cell.gradient
@@ -237,7 +251,7 @@ def _gather(space: Space, kind: CellKind, store: CellStore) -> wp.Function:
                     checkerboard += cell.modes * sign[k]
         for row in range(wp.static(space.dim)):
             gradient[row] += beyond[row]
-        part = space.real(1.0) / space.real(end - first)
+        part = space.real(1.0) / found
         return part * value, part * gradient, part * checkerboard, part * frame
 
     return gather

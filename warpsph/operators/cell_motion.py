@@ -14,7 +14,7 @@ from ..device.compiling import forward_kernel
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..state.body import Body
-from ..state.cells import NodeCells, corner_place
+from ..state.cells import NodeCells, cell_in_slot, corner_place
 from ..state.clock import FOLDED
 from .cell_means import edges_function, folded_function
 from .motion import Motion
@@ -43,7 +43,7 @@ class CellMotion(Motion):
         self._cell_h = wp.zeros_like(body.auxiliary.smoothing_length)
         self._spacing = Spacing(body)
         self._shift, self._measure = _shift_kernel(space), _measure_kernel(space, body.kind)
-        self._share = _share_kernel(space, body.kind)
+        self._share = _share_kernel(space, body.kind, body.slots)
         self.kernels = (self._shift, self._measure, self._share, *self._spacing.kernels)
 
     def mark(self) -> None:
@@ -144,8 +144,8 @@ def _measure_kernel(space: Space, kind: CellKind):
 
 
 @cache
-def _share_kernel(space: Space, kind: CellKind):
-    types, real, place_of = space.types, space.real, corner_place(kind)
+def _share_kernel(space: Space, kind: CellKind, slots: bool):
+    types, real, place_of, cell_at = space.types, space.real, corner_place(kind), cell_in_slot(kind)
     packed_nodes, packed_auxiliary = packed(types.MaterialNodes), packed(types.AuxiliaryNodes)
 
     @forward_kernel
@@ -163,19 +163,21 @@ def _share_kernel(space: Space, kind: CellKind):
         i = first + wp.tid()
         packed_nodes(nodes)
         packed_auxiliary(auxiliary)
-        total, h = real(0.0), real(0.0)
-        begin, end = table.first[i], table.first[i + 1]
-        if table.regular[i] == 1:  # the same as below, unrolled
+        total, found, h = real(0.0), real(0.0), real(0.0)
+        if wp.static(slots):
             for k in range(wp.static(kind.corners)):
-                a, _ = place_of(begin + k, table)
-                total += auxiliary.volume[a]
-                h = wp.max(h, auxiliary.smoothing_length[a])
-        else:
-            for entry in range(begin, end):
+                a = cell_at(i, k, table)
+                if a >= 0:
+                    total += auxiliary.volume[a]
+                    found += real(1.0)
+                    h = wp.max(h, auxiliary.smoothing_length[a])
+        else:  # the same, entry by entry
+            for entry in range(table.first[i], table.first[i + 1]):
                 a, _ = place_of(entry, table)
                 total += auxiliary.volume[a]
+                found += real(1.0)
                 h = wp.max(h, auxiliary.smoothing_length[a])
-        volume = total / real(end - begin)
+        volume = total / found
         nodes.volume[i] = volume
         nodes.density[i] = nodes.weight[i] / volume
         nodes.smoothing_length[i] = h

@@ -13,7 +13,11 @@ from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.resolve import BoundaryTable
-from ..state.clock import END, NON_FINITE, Clock
+from ..state.clock import END, NON_FINITE, TOO_FAST, Clock
+
+# In one step the surroundings of a node deform by no more than this share of their size. Waves cross less than a
+# cell in a step: neighbours would part faster than waves travel. A body that moves as a whole may be of any speed.
+MOST_A_STEP = 1.0
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class Conditions:
         boundary: the resolved conditions.
         n: number of material nodes.
         clock: drives the conditions.
+        moves: whether displacements are large, so that no body deforms faster than waves travel.
         turns: whether edges that nobody moves turn with their nodes.
 
     Attributes:
@@ -91,13 +96,14 @@ class Conditions:
         space: Space,
         launcher: Launcher,
         clock: Clock,
+        moves: bool = True,
         turns: bool = False,
     ):
         self._launcher, self._clock = launcher, clock
         self.types = condition_types(space, boundary.loaded)
         self.table = self.types.Table()
         self._fill(boundary, n, space)
-        self._kernel, self._turn = apply_kernel(space, self.types), turn_kernel(space, self.types)
+        self._kernel, self._turn = apply_kernel(space, self.types, moves), turn_kernel(space, self.types)
         self.kernels = (self._kernel, self._turn)
         free = ~boundary.moved & turns
         self._any_turns = bool(free.any())
@@ -131,19 +137,20 @@ class Conditions:
             self._launcher.launch(self._turn, nodes.point, [nodes, self._turns, dt, self.table], gathers=False)
 
     def apply(self, nodes) -> None:
-        """Step 13: impose the conditions at the end of the step on the nodes, in place; note values not finite."""
-        inputs = [self.table, nodes, self._clock.faults]
+        """Step 13: impose the conditions at the end of the step, in place; note what can not be true."""
+        inputs = [self.table, self._clock.time_step, nodes, self._clock.faults]
         self._launcher.launch(self._kernel, nodes.point, inputs, gathers=False)
 
 
 @cache
-def apply_kernel(space: Space, conditions: ConditionTypes):
+def apply_kernel(space: Space, conditions: ConditionTypes, moves: bool):
     """The kernel of step 13."""
 
     @forward_kernel
     def apply_conditions(
         first: int,
         table: conditions.Table,
+        time_step: wp.array(dtype=space.real),
         nodes: space.types.MaterialNodes,
         faults: wp.array(dtype=wp.int32),
     ):
@@ -154,6 +161,10 @@ def apply_kernel(space: Space, conditions: ConditionTypes):
         # A NaN position is nobody's neighbour, so that it would never show in φ.
         if not wp.isfinite(wp.dot(phi, phi) + wp.dot(u, u)):
             faults[NON_FINITE] = 1
+        if wp.static(moves):
+            deformed = time_step[0] * nodes.velocity_gradient[i]
+            if not wp.ddot(deformed, deformed) < space.real(wp.static(MOST_A_STEP**2)):
+                faults[TOO_FAST] = 1
 
     return apply_conditions
 

@@ -18,8 +18,7 @@ from ..mesh.mesh import Mesh
 
 
 class Fluxes(Protocol):
-    """Steps 3-10 of a body, the waves: built as `fluxes(body, conditions=…, around_auxiliary=…, around_nodes=…,
-    faults=…)`.
+    """Steps 3-10 of a body, the waves: built as `fluxes(body, conditions=…, around_auxiliary=…, around_nodes=…)`.
 
     Attributes:
         kernels: all that it launches.

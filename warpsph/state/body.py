@@ -11,7 +11,7 @@ from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..scene.scene import Scene
-from .cells import NodeCells, node_cells
+from .cells import NodeCells, has_slots, node_cells
 from .nodes import auxiliary_nodes, material_internals, material_nodes
 
 
@@ -28,6 +28,7 @@ class Body:
         nodes: material nodes (struct of arrays, see `warpsph.state.nodes`).
         internals: what each node remembers of the material, or None.
         auxiliary: auxiliary nodes.
+        slots: whether `node_cells` has them.
         node_cells: the cells around each node.
         launcher: launches the kernels that work on it.
     """
@@ -40,6 +41,7 @@ class Body:
     nodes: object
     internals: wp.array | None
     auxiliary: object
+    slots: bool
     node_cells: NodeCells
     launcher: Launcher
 
@@ -47,6 +49,7 @@ class Body:
     def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
         """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
         law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
+        slots = has_slots(scene.mesh)
         return Body(
             scene=scene,
             space=space,
@@ -56,6 +59,7 @@ class Body:
             nodes=material_nodes(scene, space, device),
             internals=material_internals(scene, law, space, device),
             auxiliary=auxiliary_nodes(scene, space, kind, device),
-            node_cells=node_cells(scene.mesh, device),
+            slots=slots,
+            node_cells=node_cells(scene.mesh, slots, device),
             launcher=launcher,
         )

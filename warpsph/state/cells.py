@@ -12,18 +12,18 @@ from ..mesh.kinds import CellKind
 from ..mesh.mesh import Mesh
 from ..physics.space import Space
 
+ALIGNED = 4  # a cell begins at a multiple of so many numbers, for vector registers
+
 
 @wp.struct
 class NodeCells:
     """The cells around node i: place[first[i]], …, place[first[i + 1] − 1], each cell · corners + corner.
 
-    `regular` is 1 where node i is each corner of one cell, in this order, as inside of a lattice: loops over the
-    entries can be unrolled, with the corner known to the compiler, at a fifth of a pass over the nodes.
+    With slots, as a lattice has them, place[corners · i + k] is the cell whose corner k node i is, or −1.
     """
 
     first: wp.array(dtype=wp.int32)
     place: wp.array(dtype=wp.int32)
-    regular: wp.array(dtype=wp.int32)
 
 
 def cell_table(mesh: Mesh, kind: CellKind, device: wp.Device) -> wp.array:
@@ -38,16 +38,41 @@ def cell_table(mesh: Mesh, kind: CellKind, device: wp.Device) -> wp.array:
     return wp.array(mesh.cells, dtype=wp.int32, device=device)
 
 
-def node_cells(mesh: Mesh, device: wp.Device) -> NodeCells:
-    """The cells around each node, in the order of the corners it is of them."""
-    first, place = mesh.cells_of_nodes()
-    once = np.arange(mesh.kind.corners)
-    regular = np.diff(first) == len(once)
-    regular[regular] = (place[first[:-1][regular, None] + once] % len(once) == once).all(axis=1)
+def has_slots(mesh: Mesh) -> bool:
+    """Whether no node is the same corner of two cells, as in a lattice, so that each corner can have a slot."""
+    corners = mesh.kind.corners
+    return bool(np.bincount((mesh.cells * corners + np.arange(corners)).ravel()).max() == 1)
+
+
+def node_cells(mesh: Mesh, slots: bool, device: wp.Device) -> NodeCells:
+    """The cells around each node, in the order of the corners it is of them.
+
+    In slots they are found without a look at where a row begins, and loops over them are unrolled, with the corner
+    known to the compiler: 3 % of a step in the plane.
+    """
+    (first, place), corners = mesh.cells_of_nodes(), mesh.kind.corners
+    if slots:
+        rows = corners * np.arange(len(mesh.nodes) + 1)
+        cells = np.full(rows[-1], -1)
+        cells[np.repeat(rows[:-1], np.diff(first)) + place % corners] = place // corners
+        first, place = rows, cells
     table = NodeCells()
-    for name, values in (("first", first), ("place", place), ("regular", regular)):
-        setattr(table, name, wp.array(values, dtype=wp.int32, device=device))
+    table.first, table.place = (wp.array(row, dtype=wp.int32, device=device) for row in (first, place))
     return table
+
+
+@cache
+def cell_in_slot(kind: CellKind) -> wp.Function:
+    """(node, corner, NodeCells with slots) → the cell whose corner the node is, or −1."""
+    packed_table = packed(NodeCells)
+
+    @wp.func
+    def cell_at(i: int, k: int, table: NodeCells):
+        packed_table(table)
+        natural(i)
+        return table.place[wp.static(kind.corners) * i + k]
+
+    return cell_at
 
 
 @cache
@@ -72,11 +97,11 @@ class CellStore:
 
     Attributes:
         columns: number of hourglass modes kept; at least one, since Warp has no matrix without columns.
-        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each), `frame` (∇ξ_a in row a), `reach`: how
-            far towards its corners strain rates may be taken.
+        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each), `frame` (∇ξ_a in row a), `reach`,
+            how far towards its corners strain rates may be taken.
         by_number: whether the same number of consecutive cells stands side by side in memory, for a GPU whose
             threads read it together, or all the numbers of a cell, for the vector registers of a CPU.
-        size: how many numbers a cell has.
+        size: how many numbers a cell has, spare ones included.
         write: (cell, Cell, numbers) → nothing.
         read: (cell, numbers) → Cell.
         packed: (numbers) → nothing: for the compiler, see `warpsph.device.arrays`.
@@ -140,4 +165,5 @@ def cell_store(space: Space, kind: CellKind, by_number: bool) -> CellStore:
         cell.reach = numbers[reach_at, a]
         return cell
 
-    return CellStore(columns, Cell, by_number, reach_at + 1, write, read, packed_numbers)
+    whole = -(-(reach_at + 1) // ALIGNED) * ALIGNED
+    return CellStore(columns, Cell, by_number, whole, write, read, packed_numbers)

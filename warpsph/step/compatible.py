@@ -27,7 +27,6 @@ from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.front import STRENGTH, front_pressure
 from ..operators.motion import half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import NeighbourSums, batch_on, cell_metric, neighbour_sums
-from ..operators.watch import watch_rate
 from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scheme import Scheme, wave_limit
@@ -80,7 +79,6 @@ class CompatibleFluxes:
         body: the body.
         conditions: its boundary conditions.
         around_auxiliary, around_nodes: the pair lists.
-        faults: where kernels note what can not be true.
 
     Attributes:
         kernels: the kernels of the two passes.
@@ -93,13 +91,12 @@ class CompatibleFluxes:
         conditions: Conditions,
         around_auxiliary: PairList,
         around_nodes: PairList,
-        faults: wp.array,
     ):
-        self._body, self._conditions, self._faults = body, conditions, faults
+        self._body, self._conditions = body, conditions
         self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
         scene, space, law, device = body.scene, body.space, body.law, body.launcher.device
         self._front, self._corner_share = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
-        means = cell_means(space, body.kind, numbers_side_by_side(device))
+        means = cell_means(space, body.kind, slots=body.slots, by_number=numbers_side_by_side(device))
         self._cells = means.store.new(len(scene.mesh.cells), space, device)
         sums = neighbour_sums(space, scene.numerics.smoothing, batch_on(device))
         metric = cell_metric(space, scene.numerics.smoothing_ratio)
@@ -125,7 +122,7 @@ class CompatibleFluxes:
         """Steps 7-10: φ_node^{n+1/2} with the conditions at t + Δt/2, then φ_adv."""
         body = self._body
         inputs = [body.parameters, self._conditions.table, dt, self._corner_share, self._around_nodes]
-        inputs += [body.auxiliary, body.node_cells, self._cells, body.nodes, self._faults]
+        inputs += [body.auxiliary, body.node_cells, self._cells, body.nodes]
         body.launcher.launch(self._to_nodes, body.nodes.point, inputs)
 
 
@@ -191,7 +188,7 @@ def _to_nodes_kernel(
     conditions: ConditionTypes,
 ):
     types, real, phi = space.types, space.real, space.phi
-    rate, damped, watch = wave_rate(space, law.Parameters), taken_off(space), watch_rate(space)
+    rate, damped = wave_rate(space, law.Parameters), taken_off(space)
     packed_nodes, packed_auxiliary = packed(types.MaterialNodes), packed(types.AuxiliaryNodes)
 
     @forward_kernel
@@ -206,7 +203,6 @@ def _to_nodes_kernel(
         node_cells: NodeCells,
         cells: wp.array2d(dtype=real),
         nodes: types.MaterialNodes,
-        faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
         packed_nodes(nodes)
@@ -227,7 +223,6 @@ def _to_nodes_kernel(
         nodes.point[i].phi = phi.with_stress(phi.with_velocity(phi_adv, v_adv), phi.stress(phi_adv) - lost)
         nodes.half_velocity[i] = phi.velocity(phi_half)
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
-        watch(phi.velocity_gradient(grad), dt, faults)
 
     return to_nodes
 

@@ -14,7 +14,6 @@ from ..materials.law import Law
 from ..operators.conditions import Conditions, ConditionTypes
 from ..operators.motion import Motion, half_step_gradient, initial_gradient
 from ..operators.neighbour_sums import NeighbourSums, batch_on, neighbour_sums, round_metric
-from ..operators.watch import watch_rate
 from ..physics.space import Space
 from ..physics.waves import wave_rate
 from ..scene.scheme import Scheme, wave_limit
@@ -61,7 +60,6 @@ class PublishedFluxes:
         body: the body.
         conditions: its boundary conditions.
         around_auxiliary, around_nodes: the pair lists.
-        faults: where kernels note what can not be true.
 
     Attributes:
         kernels: the kernels of the two passes.
@@ -75,9 +73,8 @@ class PublishedFluxes:
         conditions: Conditions,
         around_auxiliary: PairList,
         around_nodes: PairList,
-        faults: wp.array,
     ):
-        self._body, self._conditions, self._faults = body, conditions, faults
+        self._body, self._conditions = body, conditions
         self._around_auxiliary, self._around_nodes = around_auxiliary, around_nodes
         space, law = body.space, body.law
         sums = neighbour_sums(space, body.scene.numerics.smoothing, batch_on(body.launcher.device))
@@ -107,7 +104,6 @@ class PublishedFluxes:
             self._around_nodes,
             body.auxiliary,
             body.nodes,
-            self._faults,
         ]
         body.launcher.launch(self._to_nodes, body.nodes.point, inputs)
 
@@ -146,7 +142,6 @@ def _to_nodes_kernel(
     conditions: ConditionTypes,
 ):
     phi, metric_of, rate = space.phi, round_metric(space), wave_rate(space, law.Parameters)
-    watch = watch_rate(space)
 
     @forward_kernel
     def to_nodes(
@@ -157,7 +152,6 @@ def _to_nodes_kernel(
         pairs: PairList,
         auxiliary: space.types.AuxiliaryNodes,
         nodes: space.types.MaterialNodes,
-        faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
         dt, point = time_step[0], nodes.point[i]
@@ -173,7 +167,6 @@ def _to_nodes_kernel(
         nodes.point[i].phi = phi.with_stress(phi.with_velocity(point.phi, v_adv), sigma_adv)
         nodes.half_velocity[i] = v_half
         nodes.velocity_gradient[i] = phi.velocity_gradient(grad)
-        watch(phi.velocity_gradient(grad), dt, faults)
 
     return to_nodes
 

@@ -47,6 +47,7 @@ class Stepper:
                 space=space,
                 launcher=launcher,
                 clock=self.clock,
+                moves=scene.large_displacements,
                 turns=turns,
             )
         else:
@@ -58,7 +59,6 @@ class Stepper:
             conditions=self.conditions,
             around_auxiliary=self.lists.around_auxiliary,
             around_nodes=self.lists.around_nodes,
-            faults=self.clock.faults,
         )
         self._recording: Recording | None = None
         self._recorded: tuple[int, ...] = ()

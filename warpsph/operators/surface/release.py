@@ -48,7 +48,8 @@ class FreeSurfaceConditions(Conditions):
 
     def __init__(self, scene: Scene, nodes, *, space: Space, launcher: Launcher, clock: Clock):
         device, mesh, surface = launcher.device, scene.mesh, scene.free_surface
-        super().__init__(scene.boundary, len(mesh.nodes), space=space, launcher=launcher, clock=clock)
+        moves = scene.large_displacements
+        super().__init__(scene.boundary, len(mesh.nodes), space=space, launcher=launcher, clock=clock, moves=moves)
         self._unmoved = ~surface.moved(mesh, scene.boundary)
         self._moves = scene.large_displacements
         candidates = surface.candidates(mesh, scene.conditions)
@@ -61,7 +62,7 @@ class FreeSurfaceConditions(Conditions):
         self.table.unloading = wp.array(_unloading(scene), dtype=space.real, device=device)
         self._turned = wp.zeros(len(candidates), dtype=space.real, device=device)
         self.outdated = clock.new_flag()
-        self._kernel = apply_kernel(space, self.types)
+        self._kernel = apply_kernel(space, self.types, moves)
         self._project = _project_kernel(space, self.types)
         self._turn = _turn_kernel(space, self.types)
         self.kernels = (self._kernel, self._project, self._turn, *self._scan.kernels)
