@@ -31,7 +31,7 @@ from ..state.cells import CellStore, NodeCells, cell_in_slot, cell_store, corner
 # could follow, and ends a run whose nodes move.
 FOLDED = 0.05
 # Towards the corners of a cell n times as long as high the strain rate is taken by no more than 2.2/n, since
-# `corner_share` balances square cells: with more, waves in flat ones grow (tests/test_hard_cases.py).
+# `corner_share` balances square cells: with more, waves in flat ones grow (tests/test_breakdown.py).
 FLATTEST = 2.2
 
 
