@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from ..errors import StoppedError
 from ..simulation.checkpoint import Checkpoints
@@ -16,14 +16,14 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "
 
 
 @contextlib.contextmanager
-def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
+def handled(handler: Callable[[int, object], None], signals: Sequence[int] = SIGNALS) -> Iterator[None]:
     """Signals that end a process go to a handler meanwhile; those that are ignored stay so.
 
     Only a main thread can do this; elsewhere nothing changes.
     """
     previous = {}
     if threading.current_thread() is threading.main_thread():
-        for each in SIGNALS:
+        for each in signals:
             if signal.getsignal(each) is not signal.SIG_IGN:  # a worker leaves interrupts to its parent
                 previous[each] = signal.signal(each, handler)
     try:
@@ -31,6 +31,11 @@ def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
     finally:
         for each, former in previous.items():
             signal.signal(each, former)
+
+
+def interruptible() -> contextlib.AbstractContextManager[None]:
+    """Ctrl-C raises a `KeyboardInterrupt` meanwhile, whatever it does before and afterwards."""
+    return handled(signal.default_int_handler, (signal.SIGINT,))
 
 
 @contextlib.contextmanager
