@@ -16,7 +16,7 @@ from .exporting import add_export
 from .parent import end_with_parent
 from .plotting import add_plot
 from .run_command import add_run
-from .stopping import interruptible
+from .stopping import interruptible, status_of
 from .streams import steady_streams
 
 # Rooms above this one add their commands by these modules: a name, since imports point down.
@@ -35,9 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except StoppedError as stop:
             print(f"warpsph: {stop}", file=sys.stderr)
             return stop.status
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
             print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
-            return 130
+            return status_of(stop)
         except OSError as error:  # a disk that is full, above all
             print(f"warpsph: {error}", file=sys.stderr)
             return 1

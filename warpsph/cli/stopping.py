@@ -38,13 +38,29 @@ def interruptible() -> contextlib.AbstractContextManager[None]:
     return handled(signal.default_int_handler, (signal.SIGINT,))
 
 
+class Interrupt(KeyboardInterrupt):
+    """A signal that ends a process came.
+
+    Attributes:
+        status: exit status that says so, 128 + the signal's number.
+    """
+
+    def __init__(self, number: int):
+        self.status = 128 + number
+
+
+def status_of(stop: KeyboardInterrupt) -> int:
+    """Exit status of a command that was interrupted: by that signal, or by Ctrl-C."""
+    return getattr(stop, "status", 128 + signal.SIGINT)
+
+
 @contextlib.contextmanager
 def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Every signal that ends a process raises a `KeyboardInterrupt` meanwhile, after `tell` was called."""
+    """Every signal that ends a process raises an `Interrupt` meanwhile, after `tell` was called."""
 
     def stop(number: int, frame: object) -> None:
         tell()
-        raise KeyboardInterrupt
+        raise Interrupt(number)
 
     with handled(stop):
         yield
