@@ -75,7 +75,7 @@ def test_inner_edge_of_a_solid():
     """An L, three cells deep: the line in its notch, ends included."""
     kept = np.ones((4, 3, 4), dtype=bool)
     kept[2:, :, 2:] = False
-    mesh = grid_lattice(kept, 0.5, np.zeros(3), np.array([2.0, 1.5, 2.0]))
+    mesh = grid_lattice(kept, spacing=0.5, origin=np.zeros(3), size=np.array([2.0, 1.5, 2.0]))
     assert places(mesh, reentrant_nodes(mesh)) == {(1.0, 0.5 * k, 1.0) for k in range(4)}
 
 

@@ -8,6 +8,7 @@ are the origin and the ends of the axes.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -71,6 +72,33 @@ class CellKind:
     def signs(self) -> np.ndarray:
         """±1 of each corner in each hourglass mode, shape (c, modes)."""
         return np.array([[side[list(axes)].prod() for axes in self.modes] for side in self.sides])
+
+    @cached_property
+    def mirrored(self) -> Corners:
+        """The corners of the same cell counted the other way round, which turns the sign of its Jacobian."""
+        if not self.grid:
+            return (*range(self.dim - 1), self.dim, self.dim - 1)
+        return tuple(self.points.index((*point[:-1], 1.0 - point[-1])) for point in self.points)
+
+    def simplices(self, start: Sequence[int]) -> tuple[Corners, ...]:
+        """The corners of the simplices that cut a grid's cell (Kuhn), d! of them, each counted the positive way.
+
+        One for every order of the axes, along which it goes from one corner of the cell to the opposite one. Cells
+        side by side match if they start in the same corner, or in one mirrored in the face between them.
+
+        Args:
+            start: reference coordinates of the corner where all begin, each 0 or 1, shape (d,).
+        """
+        found = []
+        for order in itertools.permutations(range(self.dim)):
+            path = [tuple(map(float, start))]
+            for axis in order:
+                path.append((*path[-1][:axis], 1.0 - path[-1][axis], *path[-1][axis + 1 :]))
+            corners = tuple(self.points.index(point) for point in path)
+            positive = np.linalg.det(np.diff(path, axis=0)) > 0.0
+            mirrored = (*corners[:-2], corners[-1], corners[-2])
+            found.append(corners if positive else mirrored)
+        return tuple(found)
 
 
 def _grid(name: str, dim: int, vtk: int, drawn: Corners, **more: object) -> CellKind:

@@ -1,12 +1,20 @@
-"""Meshes of the cells of a regular grid."""
+"""Meshes of the cells of a regular grid, whole or cut into simplices."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..errors import SceneError
+from .faces import mesh_of_cells
 from .kinds import GRID_KINDS
 from .mesh import NO_SIDE, Mesh
+
+# How cuts lie: the corner in which those of each cell begin, by the cell's place in the grid.
+DIAGONALS = {
+    "rising": lambda index: np.zeros_like(index),
+    "falling": lambda index: np.tile(np.eye(index.shape[1], dtype=int)[0], (len(index), 1)),
+    "alternating": lambda index: index % 2,
+}
 
 
 def hinges(kept: np.ndarray) -> np.ndarray:
@@ -39,7 +47,9 @@ def parts(kept: np.ndarray) -> int:
     return sum(root[run] == run for run in range(len(root)))
 
 
-def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.ndarray) -> Mesh:
+def grid_lattice(
+    kept: np.ndarray, *, spacing: float, origin: np.ndarray, size: np.ndarray, diagonals: str | None = None
+) -> Mesh:
     """The mesh made of the cells of a regular grid that are kept.
 
     Args:
@@ -47,6 +57,7 @@ def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.
         spacing: Δx [m].
         origin: low corner of the grid [m], shape (d,).
         size: extent of the grid along each axis [m], shape (d,); gives coordinates without round-off drift.
+        diagonals: one of `DIAGONALS` to cut the cells into triangles or tetrahedra along; None leaves them whole.
     """
     dim = kept.ndim
     if not kept.any():
@@ -60,6 +71,9 @@ def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.
     cells = cells.reshape(corner.shape)
     coordinates = np.stack(np.unravel_index(used, tuple(points)), axis=1)
     nodes = origin + size * (coordinates / np.array(kept.shape))
+
+    if diagonals is not None:
+        return mesh_of_cells(nodes, _cut(cells, DIAGONALS[diagonals](index)), spacing)
 
     padded = np.pad(kept, 1)
     faces, face_cell, face_side = [], [], []
@@ -81,3 +95,17 @@ def grid_lattice(kept: np.ndarray, spacing: float, origin: np.ndarray, size: np.
         face_cell=np.concatenate(face_cell),
         face_side=np.concatenate(face_side),
     )
+
+
+def _cut(cells: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """The simplices that a grid's cells are cut into, those of a cell one after the other, shape (d! m, d + 1).
+
+    Args:
+        cells: node indices of the grid's cells, shape (m, 2ᵈ).
+        starts: of each cell the corner where its simplices begin, 0 or 1 along each axis, shape (m, d).
+    """
+    dim = starts.shape[1]
+    kind = GRID_KINDS[dim]
+    corners = np.array([kind.simplices(point) for point in kind.points]).reshape(len(kind.points), -1)
+    which = (starts[:, None] == np.array(kind.points)).all(axis=2).argmax(axis=1)
+    return np.take_along_axis(cells, corners[which], axis=1).reshape(-1, dim + 1)
