@@ -340,10 +340,8 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         book[1] += wp.float64(mass * wp.dot(v - free, v_half))
         nodes.books[i] = book
         row = held.row[i]
-        if row >= 0:
-            if h > real(0.0):
-                held.reaction[row] = (mass / h) * (v - free)
-            a = held.projector[row] * a
+        if row >= 0 and h > real(0.0):
+            held.reaction[row] = (mass / h) * (v - free)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi

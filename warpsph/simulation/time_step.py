@@ -63,7 +63,9 @@ class TimeStep:
 
     def __init__(self, scene: Scene, shrinkage: Callable[[], float]):
         self._initial_limit, self._shrinkage = time_step_limit(scene), shrinkage
-        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.numerics.scheme.spacing(scene.mesh)  # [1/s]
+        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.numerics.scheme.spacing(
+            scene.mesh
+        )  # [1/s]
         self.stretch: Stretch | None = None
 
     @property

@@ -54,8 +54,8 @@ class CellBody:
         parameters: the law's parameters.
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
-            `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ of
-            what nobody holds; `books` [J]: work done by forces on the body, work done by conditions, lost to flow;
+            `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
+            all forces but those of the conditions; `books` [J]: work done by forces on the body, work done by conditions, lost to flow;
             `strained` ∫ |L| dt since the step was last measured.
         internals: what each node remembers of the material, or None.
         corners: node indices of each cell, shape (m, c).

@@ -58,7 +58,9 @@ class CellStepper(Stepper):
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
         n, moves = len(scene.mesh.nodes), scene.large_displacements
         self.conditions = held_table(scene.boundary, n, space=space, device=device, clock=clock)
-        self._numbers = wp.zeros((cells, numbers_of(space, cell_shape(space, body.kind))), dtype=real, device=device)
+        self._numbers = wp.zeros(
+            (cells, numbers_of(space, cell_shape(space, body.kind))), dtype=real, device=device
+        )
         self._forces = wp.zeros((cells, body.kind.corners), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self._limit = CellLimit(body, clock)
