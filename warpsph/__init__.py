@@ -31,6 +31,7 @@ from .scene import (
     Fixed,
     Free,
     FreeSurface,
+    GivenMesh,
     Linear,
     NodeValue,
     Numerics,
@@ -51,6 +52,7 @@ from .scene import (
     everywhere,
     region,
     register,
+    tag,
     where,
 )
 from .simulation.checkpoint import Checkpoint, write_checkpoint
@@ -70,6 +72,7 @@ __all__ = [
     "Fixed",
     "Free",
     "FreeSurface",
+    "GivenMesh",
     "History",
     "Linear",
     "Material",
@@ -100,6 +103,7 @@ __all__ = [
     "frames",
     "region",
     "register",
+    "tag",
     "where",
     "write_checkpoint",
 ]
