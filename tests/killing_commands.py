@@ -73,13 +73,22 @@ class Kills:
         (folder / "plate.py").write_text(SCENE)
         self.whole = folder / "whole"
         self.options = ("--frames", "6", "--checkpoint-every", "5", *OPTIONS)
-        begin = time.perf_counter()
-        ended("run", folder / "plate.py", *self.options, "--usd", self.whole / "run.usdc", "--out", self.whole)
-        self.longest = time.perf_counter() - begin
+        whole = ("run", folder / "plate.py", *self.options, "--usd", self.whole / "run.usdc", "--out", self.whole)
+        self.longest = self._duration(*whole)
         self.expected = results(self.whole)
 
+    def _duration(self, *arguments):
+        """How long a command takes [s]."""
+        begin = time.perf_counter()
+        ended(*arguments)
+        return time.perf_counter() - begin
+
+    def _strike(self, longest, *arguments):
+        """Whether a command still ran at the moment it was killed."""
+        return killed(self.chance.uniform(0.0, longest), *arguments)
+
     def _kill(self, kind, *arguments):
-        done = killed(self.chance.uniform(0.0, self.longest), *arguments)
+        done = self._strike(self.longest, *arguments)
         self.count[kind] = self.count.get(kind, 0) + done
         return done
 
@@ -124,6 +133,10 @@ class Kills:
         assert not picture.exists() or picture.read_bytes().endswith(b"IEND\xaeB`\x82")
         assert results(self.whole) == self.expected
 
+    def rare(self):
+        """What the long form does as well."""
+        return self.sweep, self.report
+
     def sweep(self):
         """No run of a killed sweep goes on without it; the same command goes on to the same table."""
         members = ("--set", "courant=0.5,0.6,0.7", "--out", self.folder / "sweep")
@@ -139,20 +152,22 @@ class Kills:
         self._kill_group("report", 15.0, "report", "--quick", "--device", "cpu", "--out", self.folder / "report")
 
     def _kill_group(self, kind, longest, *arguments):
-        number = str(uuid.uuid4())
-        process = subprocess.Popen(
-            [sys.executable, "-m", "warpsph", *map(str, arguments)],
-            env=os.environ | {NUMBER: number},
-            stdout=subprocess.DEVNULL,
-        )
-        time.sleep(self.chance.uniform(1.0, longest))
-        process.kill()
-        process.wait()
+        os.environ[NUMBER] = number = str(uuid.uuid4())
+        self._strike_group(longest, *arguments)
+        del os.environ[NUMBER]
         self.count[kind] = self.count.get(kind, 0) + 1
         limit = time.monotonic() + 30.0
         while (left := having(number)) and time.monotonic() < limit:
             time.sleep(0.2)
         assert not left, f"{kind} left {left}"
+
+    def _strike_group(self, longest, *arguments):
+        """Kill the parent alone: those that it has started must notice."""
+        command = [sys.executable, "-m", "warpsph", *map(str, arguments)]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        time.sleep(self.chance.uniform(1.0, longest))
+        process.kill()
+        process.wait()
 
 
 def having(number):
@@ -168,12 +183,13 @@ def having(number):
     return found
 
 
-if __name__ == "__main__":
+def main_of(kind):
+    """Of a module that strikes: FOLDER COUNT SEED."""
     os.environ["NO_SIGNAL"] = "yes"
-    kills, most = Kills(Path(sys.argv[1]), int(sys.argv[3])), int(sys.argv[2])
+    kills, most = kind(Path(sys.argv[1]), int(sys.argv[3])), int(sys.argv[2])
     kinds = [kills.run, kills.export, kills.plot, kills.run, kills.export]
     if most >= 50:
-        kinds += [kills.run, kills.plot, kills.sweep, kills.report]
+        kinds += [kills.run, kills.plot, *kills.rare()]
     turn = 0
     try:
         while sum(kills.count.values()) < most:
@@ -181,3 +197,7 @@ if __name__ == "__main__":
             turn += 1
     finally:
         print(kills.count, flush=True)
+
+
+if __name__ == "__main__":
+    main_of(Kills)

@@ -63,4 +63,4 @@ def test_contributing_lists_the_rooms_in_their_order():
     text = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`warpsph/[^|]*) \|", text, re.MULTILINE)
     rooms = [room for row in rows for room in re.findall(r"`warpsph/(\w+)[./]", row)]
-    assert rooms == [*ROOMS, "frames"]
+    assert rooms == [*ROOMS, "frames", "public", "__main__"]

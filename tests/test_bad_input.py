@@ -419,6 +419,7 @@ def simulation():
             (lambda s: s.field("yield_size"), "field", "'yield_size'", "one of position"),
             (lambda s: s.field(None), "field", None, "one of position"),
             (lambda s: s.nearest_node((0.0,)), "point", "(0.0,)", "2 finite numbers"),
+            (lambda s: s.nearest_node((9.0, 0.0)), "point", "(9.0, 0.0)", "the nearest node, at "),
             (lambda s: s.step(-1.0), "time_step", -1.0, "above 0"),
             (lambda s: s.step(2.0 * s.time_step_limit), "time_step", None, "at most"),
             (lambda s: s.run(until=-1.0), "until", -1.0, "at least 0"),

@@ -86,6 +86,8 @@ def test_frames_are_the_first_steps_at_or_after_their_times(tmp_path, precision)
     for name in ("nodes", "cells", "faces", "face_cell", "face_side", "spacing"):
         np.testing.assert_array_equal(getattr(frames.mesh, name), getattr(simulation.mesh, name))
     assert frames.nearest(2.4e-3).number == 2
+    with pytest.raises(SceneError, match=r"time = 1.0 is not allowed: the frames are from 0 to 0.004 s"):
+        frames.nearest(1.0)
     with pytest.raises(SceneError, match=r"field = 'densty' .*did you mean density"):
         frame.field("densty")
 

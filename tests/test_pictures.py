@@ -52,12 +52,14 @@ def test_overview_of_a_run(run, capsys):
 def test_one_time_shows_the_nearest_frame(run, capsys):
     frames = Frames(run)
     drawn = []
-    for asked, number in ((0.0, 0), (frames.times[4] * 1.01, 4), (1e9, FRAMES)):
+    for asked, number in ((0.0, 0), (frames.times[4] * 1.01, 4), (frames.times[-1] * 1.01, FRAMES)):
         assert main(["plot", str(run), "--field", "velocity", "--time", str(asked)]) == 0
         path = run / f"velocity_{number:06d}.png"
         assert capsys.readouterr().out.strip() == str(path)
         drawn.append(np.asarray(Image.open(path).convert("L")))
     assert drawn[0].shape == drawn[2].shape and (drawn[0] != drawn[2]).any(), "one scale, other content"
+    assert main(["plot", str(run), "--time", "1e9"]) == 2
+    assert "the frames are from 0 to" in capsys.readouterr().err
 
 
 def test_animation_has_every_frame(run):

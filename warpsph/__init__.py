@@ -16,94 +16,22 @@ A scene is built from named parts and run by a `Simulation`:
 (11, 1)
 """
 
+from importlib import import_module
+
+TYPE_CHECKING = False  # as type checkers know it; `typing` takes longer to import than the rest of this file
+if TYPE_CHECKING:
+    from .public import *  # noqa: F403
+
 __version__ = "0.1.0"
 
-from . import analysis, frames
-from .errors import BreakdownError, NonFiniteError, SceneError, WarpSPHError
-from .materials import Elastic, Material, PerzynaVonMises
-from .scene import (
-    PUBLISHED,
-    BodyForce,
-    Box,
-    Check,
-    Disc,
-    EdgeForce,
-    Fixed,
-    Free,
-    FreeSurface,
-    GivenMesh,
-    Linear,
-    NodeValue,
-    Numerics,
-    Output,
-    Parameter,
-    Polygon,
-    PrescribedVelocity,
-    Probe,
-    Pulse,
-    Ramp,
-    Roller,
-    Rotating,
-    Scene,
-    Shape,
-    SmoothingKernel,
-    Table,
-    edge,
-    everywhere,
-    region,
-    register,
-    tag,
-    where,
-)
-from .simulation.checkpoint import Checkpoint, write_checkpoint
-from .simulation.history import History
-from .simulation.simulation import Observer, Simulation
 
-__all__ = [
-    "PUBLISHED",
-    "BodyForce",
-    "Box",
-    "BreakdownError",
-    "Check",
-    "Checkpoint",
-    "Disc",
-    "EdgeForce",
-    "Elastic",
-    "Fixed",
-    "Free",
-    "FreeSurface",
-    "GivenMesh",
-    "History",
-    "Linear",
-    "Material",
-    "NodeValue",
-    "NonFiniteError",
-    "Numerics",
-    "Observer",
-    "Output",
-    "Parameter",
-    "PerzynaVonMises",
-    "Polygon",
-    "PrescribedVelocity",
-    "Probe",
-    "Pulse",
-    "Ramp",
-    "Roller",
-    "Rotating",
-    "Scene",
-    "SceneError",
-    "Shape",
-    "Simulation",
-    "SmoothingKernel",
-    "Table",
-    "WarpSPHError",
-    "analysis",
-    "edge",
-    "everywhere",
-    "frames",
-    "region",
-    "register",
-    "tag",
-    "where",
-    "write_checkpoint",
-]
+def __getattr__(name: str):
+    """A public name, or their list: imported when first asked for, as the command answers Ctrl-C before it is."""
+    public = import_module(".public", __name__)
+    if name == "__all__" or name in getattr(public, "__all__", ()):  # it has none yet while it is being imported
+        return globals().setdefault(name, getattr(public, name))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *import_module(".public", __name__).__all__})

@@ -1,7 +1,24 @@
-"""`python -m warpsph` is the command `warpsph`."""
+"""The command `warpsph`, and `python -m warpsph`: what is heavy is imported when Ctrl-C is answered already."""
 
+import os
+import signal
 import sys
 
-from .cli.main import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the command of `sys.argv`; returns its exit status."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored, as in the background
+        signal.signal(signal.SIGINT, _leave)
+    from .cli.main import main as command  # which answers Ctrl-C itself, while it is at work
+
+    return command()
+
+
+def _leave(number: int, frame: object) -> None:
+    """End at once: in the midst of an import there is nothing to keep, and an error would end as a traceback."""
+    os.write(2, b"warpsph: interrupted\n")
+    os._exit(128 + number)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

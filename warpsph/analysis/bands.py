@@ -67,7 +67,13 @@ def band_profile(
     along = np.linspace(-0.25, 0.25, sections) * band.length
     normal = np.array([-band.along[1], band.along[0]])
     points = band.centre + along[:, None, None] * band.along + across[None, :, None] * normal
-    return across, sample(points).mean(axis=0)
+    return across, _strain(sample, points).mean(axis=0)
+
+
+def _strain(sample: Sampler, points: np.ndarray) -> np.ndarray:
+    """The strain at points; none where there is no body."""
+    values = sample(points)
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def width_at_half(across: np.ndarray, profile: np.ndarray) -> float:
@@ -123,7 +129,7 @@ def trace_ridge(
     points = np.asarray(centre) + radii[None, :, None] * rays[:, None, :]
     window = np.ones(1 + 2 * int(0.5 * smoothing / (radii[1] - radii[0])))
     covered = np.convolve(np.ones(len(radii)), window, mode="same")
-    strain = np.array([np.convolve(along, window, mode="same") / covered for along in sample(points)])
+    strain = np.array([np.convolve(along, window, mode="same") / covered for along in _strain(sample, points)])
     best = strain.argmax(axis=1)
     row = np.arange(len(angles))
     return Ridge(np.asarray(angles), radii[best], strain[row, best], points[row, best])

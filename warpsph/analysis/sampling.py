@@ -18,7 +18,7 @@ class Sampler:
     >>> mesh = Box((1.0, 1.0), 0.5).mesh()
     >>> x, y = mesh.nodes.T
     >>> Sampler(mesh, x + 2.0 * y)(np.array([[0.25, 0.5], [9.0, 9.0]]))
-    array([1.25, 0.  ])
+    array([1.25,  nan])
     """
 
     def __init__(self, mesh: Mesh, values: np.ndarray):
@@ -29,8 +29,8 @@ class Sampler:
         self._interpolate = LinearTriInterpolator(Triangulation(*corners.T, triangles), heights)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Values at points (…, 2); 0 outside the body."""
-        return self._interpolate(points[..., 0], points[..., 1]).filled(0.0)
+        """Values at points (…, 2); NaN outside the body, where there are none."""
+        return self._interpolate(points[..., 0], points[..., 1]).filled(np.nan)
 
 
 def split_cells(mesh: Mesh, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

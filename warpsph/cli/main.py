@@ -16,6 +16,7 @@ from .exporting import add_export
 from .parent import end_with_parent
 from .plotting import add_plot
 from .run_command import add_run
+from .stopping import interruptible, status_of
 from .streams import steady_streams
 
 # Rooms above this one add their commands by these modules: a name, since imports point down.
@@ -25,24 +26,29 @@ FURTHER = ("warpsph.report.command",)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; the exit status is 0 for success, 1 for a failed check or run, 2 for bad input."""
     with steady_streams():
-        end_with_parent()
-        options = _parser().parse_args(arguments)
         try:
-            for text in sys.argv[1:] if arguments is None else arguments:
-                printable("argument", text)
-            return options.command(options)
+            with interruptible():
+                return _run(arguments)
         except SceneError as error:
             print(f"warpsph: {error}", file=sys.stderr)
             return 2
         except StoppedError as stop:
             print(f"warpsph: {stop}", file=sys.stderr)
             return stop.status
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
             print("warpsph: interrupted; what was recorded so far is kept", file=sys.stderr)
-            return 130
+            return status_of(stop)
         except OSError as error:  # a disk that is full, above all
             print(f"warpsph: {error}", file=sys.stderr)
             return 1
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    end_with_parent()
+    options = _parser().parse_args(arguments)
+    for text in sys.argv[1:] if arguments is None else arguments:
+        printable("argument", text)
+    return options.command(options)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -81,7 +87,3 @@ def _list(options: argparse.Namespace) -> int:
     for row in rows:
         print("  ".join(cell.ljust(w) for cell, w in zip(row, [*widths, 0], strict=True)).rstrip())
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from ..errors import StoppedError
 from ..simulation.checkpoint import Checkpoints
@@ -16,14 +16,14 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "
 
 
 @contextlib.contextmanager
-def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
+def handled(handler: Callable[[int, object], None], signals: Sequence[int] = SIGNALS) -> Iterator[None]:
     """Signals that end a process go to a handler meanwhile; those that are ignored stay so.
 
     Only a main thread can do this; elsewhere nothing changes.
     """
     previous = {}
     if threading.current_thread() is threading.main_thread():
-        for each in SIGNALS:
+        for each in signals:
             if signal.getsignal(each) is not signal.SIG_IGN:  # a worker leaves interrupts to its parent
                 previous[each] = signal.signal(each, handler)
     try:
@@ -33,13 +33,34 @@ def handled(handler: Callable[[int, object], None]) -> Iterator[None]:
             signal.signal(each, former)
 
 
+def interruptible() -> contextlib.AbstractContextManager[None]:
+    """Ctrl-C raises a `KeyboardInterrupt` meanwhile, whatever it does before and afterwards."""
+    return handled(signal.default_int_handler, (signal.SIGINT,))
+
+
+class Interrupt(KeyboardInterrupt):
+    """A signal that ends a process came.
+
+    Attributes:
+        status: exit status that says so, 128 + the signal's number.
+    """
+
+    def __init__(self, number: int):
+        self.status = 128 + number
+
+
+def status_of(stop: KeyboardInterrupt) -> int:
+    """Exit status of a command that was interrupted: by that signal, or by Ctrl-C."""
+    return getattr(stop, "status", 128 + signal.SIGINT)
+
+
 @contextlib.contextmanager
 def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Every signal that ends a process raises a `KeyboardInterrupt` meanwhile, after `tell` was called."""
+    """Every signal that ends a process raises an `Interrupt` meanwhile, after `tell` was called."""
 
     def stop(number: int, frame: object) -> None:
         tell()
-        raise KeyboardInterrupt
+        raise Interrupt(number)
 
     with handled(stop):
         yield

@@ -15,8 +15,8 @@ from ..simulation.device import THREADS, all_cores, choose_device, start_warp
 from ..storage.owner import owned
 from ..validate import index
 from .catalogue import load
-from .children import INTERRUPTED
 from .settings import MOST_THREADS, count
+from .stopping import status_of
 from .sweep import members, sweep, table
 
 
@@ -59,9 +59,9 @@ def _sweep(options: argparse.Namespace) -> int:
     try:
         with owned(folder), _workers(options) as workers:
             rows = sweep(chosen, folder, options.device, workers, options.quiet)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
-        return INTERRUPTED
+        return status_of(stop)
     passed = all(found["status"] in ("passed", "no checks") for found in rows)
     if not (options.quiet and passed):
         print(table(rows))

@@ -246,8 +246,16 @@ class Frames(Sequence):
         return [self.code(number) for number in self.numbers]
 
     def nearest(self, time: float) -> Frame:
-        """The frame nearest to a time [s]."""
-        return self.read(min(self.numbers, key=lambda number: abs(self.times[number] - time)))
+        """The frame nearest to a time [s].
+
+        Raises:
+            SceneError: the time is further from the run's first or last frame than frames are from each other.
+        """
+        times = np.array([self.times[number] for number in self.numbers])
+        gap = np.diff(times).max(initial=0.0)
+        if not times[0] - gap <= time <= times[-1] + gap:
+            raise SceneError("time", time, f"the frames are from {times[0]:.6g} to {times[-1]:.6g} s")
+        return self[int(np.abs(times - time).argmin())]
 
 
 def evenly(end: float, count: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from ..cli.settings import MOST_THREADS
-from ..cli.stopping import interrupting
+from ..cli.stopping import interrupting, status_of
 from ..storage.owner import owned
 from ..validate import index
 
@@ -38,7 +38,7 @@ def _report(options: argparse.Namespace) -> int:
     try:
         with owned(folder), interrupting():
             make_report(folder, quick=options.quick, device=options.device, jobs=options.jobs)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("warpsph: interrupted; the same command goes on from here", file=sys.stderr)
-        return 130
+        return status_of(stop)
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
@@ -12,6 +11,7 @@ import numpy as np
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
 from ..validate import choice, index, instance, listed, number, vector
+from .place import node_at
 from .selection import Selection
 
 
@@ -75,12 +75,7 @@ class NodeValue:
 
     def check(self, mesh: Mesh) -> None:
         """Raise `SceneError` when the point is not in the body, to within a cell."""
-        distance = np.linalg.norm(mesh.nodes - vector("NodeValue.near", self.near, mesh.dim), axis=1)
-        node = int(distance.argmin())
-        if distance[node] > math.sqrt(mesh.dim) * mesh.largest_edge():
-            at = tuple(round(x, 6) for x in mesh.nodes[node].tolist())
-            allowed = f"it must be in the body; the nearest node, at {at}, is {distance[node]:.4g} m away"
-            raise SceneError("NodeValue.near", self.near, allowed)
+        node_at("NodeValue.near", self.near, mesh)
 
     def __call__(self, simulation) -> float:
         values = component("NodeValue", simulation.field(self.field), self.component)

@@ -15,10 +15,11 @@ from ..device.launching import Launcher
 from ..device.precision import precision as precision_of
 from ..errors import SceneError, one_of
 from ..physics.space import Space
+from ..scene.place import node_at
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
 from ..step.step import Stepper
-from ..validate import instance, number, vector
+from ..validate import instance, number
 from .breakdown import FLATTENED, LEAST_STEP_SHARE, breakdown
 from .device import choose_device, choose_threads
 from .fields import fields_of
@@ -196,9 +197,12 @@ class Simulation:
         }
 
     def nearest_node(self, point: Iterable[float]) -> int:
-        """Index of the material node that is initially nearest to a point [m]."""
-        target = np.array(vector("point", tuple(point), self.mesh.dim))
-        return int(np.argmin(((self.mesh.nodes - target) ** 2).sum(axis=1)))
+        """Index of the material node that is initially nearest to a point of the body [m].
+
+        Raises:
+            SceneError: the point is not in the body, to within a cell.
+        """
+        return node_at("point", tuple(point), self.mesh)
 
     @property
     def list_builds(self) -> int:
