@@ -1,7 +1,7 @@
 """Whether points and cells from anywhere make a body: each check names the first thing that is wrong.
 
-Cells must have volume, corners that differ, and lie side by side: a face is between two cells or on the boundary. The
-body is in one piece, hangs together by faces wherever it hangs together, and does not lie on itself.
+Cells must have volume, corners that differ, and lie side by side: a face is between two cells or on the boundary.
+The body is in one piece, hangs together by faces wherever it hangs together, and does not lie on itself.
 """
 
 from __future__ import annotations
@@ -35,9 +35,7 @@ def check_corners(cells: np.ndarray, points: int) -> None:
         raise _wrong_cell(cells, again, f"cells[{first[back[again]]}] has the same corners")
     unused = np.bincount(cells.ravel(), minlength=points) == 0
     if unused.any():
-        raise SceneError(
-            "points", int(unused.argmax()), "it is no cell's corner; leave out points that no cell has"
-        )
+        raise SceneError("points", int(unused.argmax()), "it is the corner of no cell; leave such points out")
 
 
 def check_places(points: np.ndarray, spacing: float) -> None:
@@ -84,9 +82,7 @@ def check_faces(mesh: Mesh) -> None:
     given, match = cells[:, kind.drawn], match_faces(cells, kind)
     if len(match.crowded):
         *others, last = np.sort(match.crowded // len(kind.faces)).tolist()
-        allowed = (
-            f"one of its faces belongs to cells {_listed(others)} as well; a face is between two cells at most"
-        )
+        allowed = f"one of its faces belongs to cells {_listed(others)} as well; a face has two cells at most"
         raise _wrong_cell(given, last, allowed)
     owner, face = np.divmod(match.shared, len(kind.faces))
     _check_sides(mesh, owner, face, given)

@@ -26,13 +26,13 @@ class GivenMesh(Shape):
     Args:
         points: places of the nodes [m], shape (n, d), d = 1, 2 or 3; each a corner of some cell.
         cells: numbers of each cell's corners, counted from 0, shape (m, c), in the order of VTK: around a triangle
-            or a quad; a tetrahedron's fourth beyond its first three; around a face of a hexahedron, then in the same
-            order around the one opposite. Cells that count the other way round are turned.
+            or a quad; a tetrahedron's in any order; around a face of a hexahedron, then likewise around the one
+            opposite. It does not matter which way round.
         tags: names for parts of it, for `tag(name)`: numbers of nodes, shape (k,), or the corners of boundary
             faces, each in any order, shape (k, corners a face).
 
     Raises:
-        SceneError: the cells are no body in one piece, or a tag holds what there is not; the message names the cell.
+        SceneError: the cells are no body in one piece, or a tag holds what there is not.
 
     >>> from warpsph import GivenMesh
     >>> mesh = GivenMesh(
@@ -81,9 +81,7 @@ def _points(given: object) -> np.ndarray:
     except (TypeError, ValueError):
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] not in (1, 2, 3):
-        raise SceneError(
-            "points", given, "it must be places of nodes, numbers of shape (n, 1), (n, 2) or (n, 3) [m]"
-        )
+        raise SceneError("points", given, "it must be numbers [m] of shape (n, 1), (n, 2) or (n, 3)")
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():
         raise SceneError(f"points[{wrong.argmax()}]", tuple(points[wrong.argmax()].tolist()), "it must be finite")
@@ -93,14 +91,12 @@ def _points(given: object) -> np.ndarray:
 def _cells(given: object) -> np.ndarray:
     cells = _whole(given)
     if cells is None or cells.ndim != 2 or not len(cells):
-        raise SceneError(
-            "cells", given, "it must be whole numbers of shape (m, c), the corners of one cell or more"
-        )
+        raise SceneError("cells", given, "it must be whole numbers of shape (m, c), c corners of one cell or more")
     return cells
 
 
 def _numbers(name: object, given: object) -> np.ndarray:
-    """What a tag holds, as the shape keeps it: numbers of nodes, shape (k,), or of faces' corners, shape (k, …)."""
+    """What a tag holds, as the shape keeps it: numbers of nodes (k,), or of the corners of faces (k, c)."""
     if not isinstance(name, str) or not name:
         raise SceneError("tags", name, "a name must be a text")
     numbers = _whole(given)
