@@ -73,6 +73,11 @@ class CellKind:
         """±1 of each corner in each hourglass mode, shape (c, modes)."""
         return np.array([[side[list(axes)].prod() for axes in self.modes] for side in self.sides])
 
+    @cached_property
+    def regular(self) -> np.ndarray:
+        """∂x/∂ξ of a regular cell with edges of length 1, a column an axis, shape (d, d)."""
+        return np.eye(self.dim) if self.grid else np.linalg.cholesky(0.5 * (1.0 + np.eye(self.dim))).T
+
     def slopes(self, place: Sequence[float]) -> np.ndarray:
         """∂N_k/∂ξ_a at a place ξ of the reference cell, shape (c, d)."""
         if not self.grid:

@@ -140,12 +140,24 @@ class Mesh:
         corners = self.nodes[self.cells]
         return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
 
+    @cached_property
+    def cell_stretches(self) -> np.ndarray:
+        """Lengths of each cell along its principal axes [m], longest first, shape (m, d).
+
+        They are the singular values of the map from a cell with edges of length 1, all alike: from a square or a
+        cube, or from a regular triangle or tetrahedron, and so do not depend on which corner is the first.
+        """
+        jacobians = self.cell_jacobians()
+        if not self.kind.grid:
+            jacobians = jacobians @ np.linalg.inv(self.kind.regular)
+        return np.linalg.svd(jacobians, compute_uv=False)
+
     def smallest_distance(self) -> float:
-        """Least distance across a cell [m]: the least singular value of its edges, which a wave sees.
+        """Least distance across a cell [m], which a wave sees: the least of `cell_stretches`.
 
         In a cell that leans it is less than the distance between the middles of opposite faces.
         """
-        return float(np.linalg.svd(self.cell_jacobians(), compute_uv=False).min())
+        return float(self.cell_stretches.min())
 
     def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.
