@@ -80,7 +80,7 @@ def _encode(value: object, path: str, scene: Scene, arrays: dict) -> object:
         return value
     if isinstance(value, tuple | list):
         return [_encode(part, f"{path}.{k}", scene, arrays) for k, part in enumerate(value)]
-    if path.rpartition(".")[2] in TABLES:
+    if isinstance(value, Mapping) and path.rpartition(".")[2] in TABLES:
         return {name: _encode(part, f"{path}.{k}", scene, arrays) for k, (name, part) in enumerate(value.items())}
     if isinstance(value, FunctionOfTime):
         value = value.function
