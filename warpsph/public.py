@@ -13,6 +13,7 @@ from .scene import (
     Fixed,
     Free,
     FreeSurface,
+    GivenMesh,
     Linear,
     NodeValue,
     Numerics,
@@ -33,6 +34,7 @@ from .scene import (
     everywhere,
     region,
     register,
+    tag,
     where,
 )
 from .simulation.checkpoint import Checkpoint, write_checkpoint
@@ -52,6 +54,7 @@ __all__ = [
     "Fixed",
     "Free",
     "FreeSurface",
+    "GivenMesh",
     "History",
     "Linear",
     "Material",
@@ -82,6 +85,7 @@ __all__ = [
     "frames",
     "region",
     "register",
+    "tag",
     "where",
     "write_checkpoint",
 ]

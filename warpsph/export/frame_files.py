@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mesh.continuum import CONTINUA
 from ..mesh.kinds import KINDS
-from ..mesh.mesh import Mesh
+from ..mesh.mesh import ARRAYS, Mesh
 from ..simulation.fields import FIELDS
 from ..storage.files import remove_parts, whole
 from ..storage.owner import marked
@@ -90,7 +90,7 @@ def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
     path = run / FOLDER / BODY
     arrays = read_arrays("frames", path)
     with reading("frames", path):
-        parts = {name: arrays[name] for name in Mesh.__dataclass_fields__}
+        parts = {name: arrays[name] for name in ARRAYS}
         spacing = float(check_array("spacing", parts["spacing"], shape=()))
         require(spacing > 0.0, "its spacing is not above 0")
         nodes, cells, faces = (parts[name] for name in ("nodes", "cells", "faces"))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..analysis import green_strain, mean_stress, von_mises
 from ..errors import SceneError, one_of
-from ..mesh.mesh import Mesh
+from ..mesh.mesh import ARRAYS, Mesh
 from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
 from ..storage.files import write_json
@@ -97,7 +97,7 @@ class FrameWriter:
 
     def _describe(self, simulation: Simulation, rate: float) -> None:
         mesh, output, walls = simulation.mesh, simulation.scene.output, walls_of(simulation.scene)
-        parts = {name: getattr(mesh, name) for name in Mesh.__dataclass_fields__}
+        parts = {name: getattr(mesh, name) for name in ARRAYS}
         save_arrays(self._run / FOLDER / BODY, parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
         about = {
             "scene": simulation.scene.name,
@@ -139,7 +139,7 @@ class Frame:
         number: index of the time asked for.
         time: simulated time [s].
         step: number of the step.
-        mesh: the initial mesh.
+        mesh: the initial mesh, without its tags.
         stored: the stored fields, name → values.
     """
 
@@ -173,7 +173,7 @@ class Frames(Sequence):
         about: what `about.json` says.
         times: those asked for [s].
         rate: frames a second of simulated time [1/s].
-        mesh: the initial mesh.
+        mesh: the initial mesh, without its tags.
         walls: what surrounds the body.
 
     Raises:

@@ -74,6 +74,20 @@ class CellKind:
         return np.array([[side[list(axes)].prod() for axes in self.modes] for side in self.sides])
 
     @cached_property
+    def regular(self) -> np.ndarray:
+        """∂x/∂ξ of a regular cell with edges of length 1, a column an axis, shape (d, d)."""
+        return np.eye(self.dim) if self.grid else np.linalg.cholesky(0.5 * (1.0 + np.eye(self.dim))).T
+
+    def slopes(self, place: Sequence[float]) -> np.ndarray:
+        """∂N_k/∂ξ_a at a place ξ of the reference cell, shape (c, d)."""
+        if not self.grid:
+            return np.array(self.gradients)
+        points = np.array(self.points)
+        parts = np.where(points == 1.0, place, 1.0 - np.asarray(place))
+        others = [np.delete(parts, axis, axis=1).prod(axis=1) for axis in range(self.dim)]
+        return self.sides * np.stack(others, axis=1)
+
+    @cached_property
     def mirrored(self) -> Corners:
         """The corners of the same cell counted the other way round, which turns the sign of its Jacobian."""
         if not self.grid:

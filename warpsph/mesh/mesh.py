@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +13,32 @@ from .continuum import CONTINUA, Continuum
 from .kinds import KINDS, CellKind
 
 NO_SIDE = -1
+ARRAYS = ("spacing", "nodes", "cells", "faces", "face_cell", "face_side")  # attributes of a mesh, but its tags
+
+
+def kind_of(dim: int, corners: int) -> CellKind:
+    """The kind of cells with so many corners in so many dimensions.
+
+    Raises:
+        SceneError: there is none.
+    """
+    if (dim, corners) not in KINDS:
+        known = one_of(f"{kind.name} ({kind.dim}D, {kind.corners})" for kind in KINDS.values())
+        raise SceneError("cells", f"{corners} corners in {dim}D", known)
+    return KINDS[dim, corners]
+
+
+@dataclass(frozen=True)
+class Tag:
+    """What a name of a mesh stands for.
+
+    Attributes:
+        nodes: their indices, rising, shape (k,).
+        faces: indices of boundary faces, rising, shape (l,).
+    """
+
+    nodes: np.ndarray
+    faces: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -26,6 +53,7 @@ class Mesh:
         face_cell: the cell each face belongs to, shape (f,).
         face_side: 2·axis where the grid ends at the low side of an axis, 2·axis + 1 at the high side, `NO_SIDE` at
             steps, notches and holes in between, shape (f,).
+        tags: parts of it that have names.
     """
 
     spacing: float
@@ -34,6 +62,7 @@ class Mesh:
     faces: np.ndarray
     face_cell: np.ndarray
     face_side: np.ndarray
+    tags: Mapping[str, Tag] = field(default_factory=dict)
 
     @property
     def dim(self) -> int:
@@ -52,11 +81,7 @@ class Mesh:
         Raises:
             SceneError: no kind has that many dimensions and corners.
         """
-        corners = self.cells.shape[1]
-        if (self.dim, corners) not in KINDS:
-            known = one_of(f"{kind.name} ({kind.dim}D, {kind.corners})" for kind in KINDS.values())
-            raise SceneError("cells", f"{corners} corners in {self.dim}D", known)
-        return KINDS[self.dim, corners]
+        return kind_of(self.dim, self.cells.shape[1])
 
     @property
     def middle(self) -> np.ndarray:
@@ -71,10 +96,14 @@ class Mesh:
         """Volume of each cell [mᵈ], shape (m,), by the Jacobian in its middle (exact for quads and simplices)."""
         return self.kind.volume * np.linalg.det(self.cell_jacobians())
 
-    def cell_jacobians(self) -> np.ndarray:
-        """∂x/∂ξ in the middle of each cell [m], the axes as columns, shape (m, d, d)."""
+    def cell_jacobians(self, slopes: np.ndarray | None = None) -> np.ndarray:
+        """∂x/∂ξ at one place of each cell [m], the axes as columns, shape (m, d, d).
+
+        Args:
+            slopes: ∂N_k/∂ξ_a there, shape (c, d); in the middle unless given.
+        """
         corners = [self.nodes[corner] for corner in self.cells.T]
-        slopes = np.array(self.kind.gradients, dtype=float).T  # float64, whatever the values are in
+        slopes = np.array(self.kind.gradients if slopes is None else slopes, dtype=float).T  # float64, always
         return np.stack([sum(g * x for g, x in zip(axis, corners, strict=True)) for axis in slopes], axis=2)
 
     @cached_property
@@ -111,12 +140,24 @@ class Mesh:
         corners = self.nodes[self.cells]
         return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
 
+    @cached_property
+    def cell_stretches(self) -> np.ndarray:
+        """Lengths of each cell along its principal axes [m], longest first, shape (m, d).
+
+        They are the singular values of the map from a cell with edges of length 1, all alike: from a square or a
+        cube, or from a regular triangle or tetrahedron, and so do not depend on which corner is the first.
+        """
+        jacobians = self.cell_jacobians()
+        if not self.kind.grid:
+            jacobians = jacobians @ np.linalg.inv(self.kind.regular)
+        return np.linalg.svd(jacobians, compute_uv=False)
+
     def smallest_distance(self) -> float:
-        """Least distance across a cell [m]: the least singular value of its edges, which a wave sees.
+        """Least distance across a cell [m], which a wave sees: the least of `cell_stretches`.
 
         In a cell that leans it is less than the distance between the middles of opposite faces.
         """
-        return float(np.linalg.svd(self.cell_jacobians(), compute_uv=False).min())
+        return float(self.cell_stretches.min())
 
     def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.

@@ -5,6 +5,7 @@ from .check import Check
 from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
+from .given_mesh import GivenMesh
 from .material import Material
 from .numerics import PUBLISHED, SOURCE_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe
@@ -13,7 +14,7 @@ from .registry import KERNELS, MATERIALS, register
 from .resolve import BoundaryTable
 from .scene import BodyForce, Scene
 from .scheme import SCHEMES, Scheme
-from .selection import edge, everywhere, region, where
+from .selection import edge, everywhere, region, tag, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
 from .smoothing import SmoothingKernel
 
@@ -38,6 +39,7 @@ __all__ = [
     "Fixed",
     "Free",
     "FreeSurface",
+    "GivenMesh",
     "Linear",
     "Mapped",
     "Material",
@@ -61,5 +63,6 @@ __all__ = [
     "everywhere",
     "region",
     "register",
+    "tag",
     "where",
 ]

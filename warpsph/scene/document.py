@@ -29,6 +29,7 @@ from .shape import Mapped, Placed, Shape
 
 FREE = "free"
 SELECTIONS = ("on", "first", "second", "inner")  # fields in which a text is the name of an edge
+TABLES = ("tags",)  # fields that hold a table of values by names of the user's
 # Fields that hold one class only need no `type`.
 PLAIN = {
     "body_force": BodyForce,
@@ -79,6 +80,8 @@ def _encode(value: object, path: str, scene: Scene, arrays: dict) -> object:
         return value
     if isinstance(value, tuple | list):
         return [_encode(part, f"{path}.{k}", scene, arrays) for k, part in enumerate(value)]
+    if isinstance(value, Mapping) and path.rpartition(".")[2] in TABLES:
+        return {name: _encode(part, f"{path}.{k}", scene, arrays) for k, (name, part) in enumerate(value.items())}
     if isinstance(value, FunctionOfTime):
         value = value.function
     if isinstance(value, Mapped):
@@ -134,11 +137,13 @@ class _Reader:
 
     def value(self, value: object, path: str) -> object:
         """A value at a place."""
+        last = path.rpartition(".")[2]
+        if isinstance(value, Mapping) and last in TABLES:
+            return {name: self.value(part, f"{path}.{k}") for k, (name, part) in enumerate(value.items())}
         if isinstance(value, Mapping):
             return self._table(value, path)
         if isinstance(value, list | tuple):
             return tuple(self.value(part, f"{path}.{k}") for k, part in enumerate(value))
-        last = path.rpartition(".")[2]
         if last in SELECTIONS and isinstance(value, str):
             return edge(value)
         return None if value == FREE and last.isdecimal() else value

@@ -179,6 +179,7 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         for node in corners:
             touching[node].append(face)
     face_normals = mesh.face_normals()
+    alike = np.unique(face_normals, axis=0, return_inverse=True)[1].ravel().tolist()
     unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
     for condition in conditions:
         if isinstance(condition, Free) and condition.normal is None:
@@ -193,10 +194,14 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         selected.append(nodes)
         covered.append(faces & nodes[mesh.faces].all(axis=1))
         given = getattr(condition, "normal", None)
-        edge = unmoved if isinstance(condition, Free) else faces
+        edge, own = (unmoved if isinstance(condition, Free) else faces).tolist(), faces.tolist()
+        known: dict[tuple, tuple] = {}  # most nodes have faces around them like those of some other node
         for node in np.flatnonzero(condition.nodes(mesh)).tolist():
             around = [face for face in touching.get(node, ()) if edge[face]]
-            normals = (given,) if given is not None else _smooth_normals(face_normals[around], faces[around])
+            key = tuple((alike[face], own[face]) for face in around)
+            if given is None and key not in known:
+                known[key] = _smooth_normals(face_normals[around], faces[around])
+            normals = known[key] if given is None else (given,)
             if not normals and condition.takes_normal:
                 raise SceneError(
                     f"conditions[{index}]",

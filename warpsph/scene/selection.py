@@ -1,4 +1,4 @@
-"""Selections of nodes: named edges, boxes, functions of position, and their combinations.
+"""Selections of nodes: named edges, tags, boxes, functions of position, and their combinations.
 
 A selection answers two questions about a lattice: which nodes it holds, and which boundary faces may give
 those nodes a normal. `edge("top") & where(lambda x, y: x <= 1.0)` holds the nodes of the top with x ≤ 1, and
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from ..mesh.mesh import Mesh
+from ..mesh.mesh import Mesh, Tag
 from ..validate import choice, index, mask_of_position, vector
 
 
@@ -66,6 +66,32 @@ class edge(Selection):  # noqa: N801 - written as a word in scenes
         if choice("edge", self.name, (*names, "boundary")) == "boundary":
             return np.ones(len(mesh.faces), dtype=bool)
         return mesh.face_side == names.index(self.name)
+
+
+@dataclass(frozen=True)
+class tag(Selection):  # noqa: N801
+    """The nodes that a mesh of one's own has a name for (`GivenMesh`).
+
+    Of a tag of nodes those boundary faces may give a normal that have all of their corners in it; of a tag of
+    faces those very faces.
+    """
+
+    name: str
+
+    def nodes(self, mesh: Mesh) -> np.ndarray:
+        mask = np.zeros(len(mesh.nodes), dtype=bool)
+        mask[self._in(mesh).nodes] = True
+        return mask
+
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        mask = np.zeros(len(mesh.faces), dtype=bool)
+        mask[self._in(mesh).faces] = True
+        return mask
+
+    def _in(self, mesh: Mesh) -> Tag:
+        if not mesh.tags:
+            raise SceneError("tag", self.name, "the shape has no tags; a GivenMesh may have some")
+        return mesh.tags[choice("tag", self.name, mesh.tags)]
 
 
 @dataclass(frozen=True)
@@ -218,5 +244,5 @@ class Bare(Selection):
 
 def _selection(value: object) -> Selection:
     if not isinstance(value, Selection):
-        raise SceneError("selection", value, "it must be edge(…), region(…), where(…) or a combination")
+        raise SceneError("selection", value, "it must be edge(…), tag(…), region(…), where(…) or a combination")
     return value

@@ -51,7 +51,7 @@ def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
     mesh, ratio = scene.mesh, scene.numerics.smoothing_ratio
     if not scene.numerics.scheme.follows_cells:
         return ratio * volume ** (1.0 / mesh.dim)
-    stretch, largest = np.linalg.norm(mesh.cell_jacobians(), 2, axis=(1, 2)), np.zeros(len(volume))
+    stretch, largest = mesh.cell_stretches[:, 0], np.zeros(len(volume))
     np.maximum.at(largest, mesh.cells, stretch[:, None])
     return ratio * largest
 
