@@ -34,16 +34,16 @@ class Processes(ProcessPoolExecutor):
     """Processes of this machine, which leave the signals of the terminal to this one from their start."""
 
     def submit(self, *arguments, **named):
-        """As of every executor; it may start a process, or multiprocessing's own, which dies when a terminal does."""
-        with terminal_waits():
-            if resource_tracker is not None:
-                resource_tracker.ensure_running()  # after which no signal waits any more
+        """As of every executor; it may start a process."""
         with terminal_waits():
             return super().submit(*arguments, **named)
 
 
 def processes(jobs: int) -> Executor:
     """Makes each run in a process of this machine, which share the cores and end with this one."""
+    if resource_tracker is not None:
+        with terminal_waits():
+            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     threads = max(1, all_cores() // jobs)
     arguments = (threads, for_child())
