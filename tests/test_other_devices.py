@@ -11,7 +11,7 @@ from warpsph.operators.conditions import Conditions
 from warpsph.operators.neighbour_sums import GPU_BATCH
 from warpsph.operators.surface.release import FreeSurfaceConditions
 from warpsph.simulation.state import slots
-from warpsph.step import compatible, lists, published, step
+from warpsph.step import compatible, lists, published, sums
 
 HOPPER = 90  # compute capability 9.0
 # Two have every kernel of both families of schemes; the others are variants of them.
@@ -34,11 +34,11 @@ def as_on_a_gpu(monkeypatch):
 def test_all_kernels_compile_for_cuda(as_on_a_gpu, name, precision, monkeypatch, tmp_path):
     """To machine code, which needs no driver."""
     kernels = []
-    for module in (step, lists):
+    for module in (sums, lists):
         monkeypatch.setattr(module, "load_kernels", lambda of_step, device: kernels.extend(of_step))
     for part in (lists.PairLists, Conditions, FreeSurfaceConditions):
         monkeypatch.setattr(part, "refresh", lambda self: None)
-    monkeypatch.setattr(step.Stepper, "_initial_spin", lambda self, scene: None)
+    monkeypatch.setattr(sums.SumsStepper, "_initial_spin", lambda self, scene: None)
     Simulation(SCENES[name](), "cpu", precision)
     modules = {kernel.module for kernel in kernels}
     for module in modules:

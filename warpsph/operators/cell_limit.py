@@ -19,7 +19,7 @@ DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that di
 
 
 class CellLimit:
-    """A `Part`: the rate of the fastest wave across a cell, measured anew when a node has strained by some per cent.
+    """A `Part`: the rate of the fastest wave across a cell, measured anew when a node has strained by 2 %.
 
     Args:
         body: the body in its initial state.

@@ -62,9 +62,9 @@ def kick_kernel(space: Space, moves: bool):
 
 @cache
 def strain_kernel(space: Space, kind: CellKind):
-    """Of each cell, at the half step: A/n, (A/n) G v, and what its hourglass modes add to it towards the corners."""
+    """Of each cell, at the half step: A/n, (A/n) G v, and what its hourglass modes add to it."""
     real, types, d = space.real, space.types, space.dim
-    shape, (Half, CellNodes) = cell_shape(space, kind), cell_node_types(space)
+    shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     per_corner, T = 1.0 / kind.corners, shape.weights
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers = packed(wp.array2d(dtype=real))

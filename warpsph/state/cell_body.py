@@ -17,7 +17,7 @@ from .nodes import material_internals
 
 @cache
 def cell_node_types(space: Space) -> tuple[type, type]:
-    """Warp structs: `Half`, position and velocity at the half step; `CellNodes`, the arrays of `CellBody.nodes`."""
+    """Warp structs: `Half`, x and v at the half step; `CellNodes`, the arrays of `CellBody.nodes`."""
     types = space.types
 
     @wp.struct
@@ -55,8 +55,8 @@ class CellBody:
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
-            all forces but those of the conditions; `books` [J]: work done by forces on the body, work done by conditions, lost to flow;
-            `strained` ∫ |L| dt since the step was last measured.
+            all forces but those of the conditions; `books` [J]: work done by forces on the body, work done by
+            conditions, lost to flow; `strained` ∫ |d| dt since the step was last measured.
         internals: what each node remembers of the material, or None.
         corners: node indices of each cell, shape (m, c).
         slots: whether `node_cells` has them.

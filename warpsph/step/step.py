@@ -40,7 +40,8 @@ class Stepper(ABC):
         """Advance the nodes by the clock's Δt; it ends with the clock's tick."""
 
     def set_courant(self, courant: float) -> None:
-        """The Courant number c_p Δt/Δx of the steps to come."""
+        """The Courant number c_p Δt/Δx of the steps to come; most schemes need not know."""
+        return
 
     def arrays_recorded(self) -> tuple[int, ...]:
         """Addresses of arrays that may be replaced: the step is then recorded anew."""
