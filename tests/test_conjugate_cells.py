@@ -12,6 +12,7 @@ from warpsph import (
     Box,
     Elastic,
     Fixed,
+    Free,
     Linear,
     Numerics,
     PerzynaVonMises,
@@ -21,6 +22,7 @@ from warpsph import (
     Simulation,
     edge,
 )
+from warpsph.errors import SceneError
 
 NUMERICS = Numerics(velocity_scheme="cells")
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
@@ -246,3 +248,44 @@ def test_energy_is_accounted_for_where_soil_flows():
     assert flow > 0.5 * held
     assert 0.0 < rough < 0.05 * held
     assert kinetic + elastic + flow + rough == pytest.approx(held, rel=0.01)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("kind", ["quads", "triangles"])
+def test_runs_are_the_same_on_any_number_of_threads_and_after_a_restart(kind, precision):
+    clay = PerzynaVonMises(young_modulus=1e6, poisson_ratio=0.3, density=2000.0, fluidity=10.0, yield_size=2e4)
+    scene = Scene(
+        shape=Box((1.0, 2.0), 0.1, cells=BODIES[kind][1]),
+        material=clay,
+        conditions=[Fixed(edge("bottom"))],
+        body_force=BodyForce((0.0, -9.81)),
+        duration=1.0,
+        numerics=NUMERICS,
+    )
+    one, two, resumed = (Simulation(scene, device="cpu", precision=precision, threads=t) for t in (1, 2, 1))
+    one.run(until=0.15)
+    two.run(until=0.15)
+    state, values = two.state()
+    resumed.restore(state, values)
+    for simulation in (one, resumed):
+        simulation.run(until=0.3)
+    assert one.field("equivalent_plastic_strain").max() > 1e-3
+    for name in one.fields():
+        assert np.array_equal(one.field(name), resumed.field(name)), name
+
+
+class Pulled(Free):
+    """A free edge with a load."""
+
+    def tractions(self, points, normal):
+        return [(np.broadcast_to(normal, points.shape), 1e3)]
+
+
+def test_what_the_scheme_has_not_is_refused_in_one_line():
+    scene = {"shape": Box((1.0, 1.0), 0.25), "material": SOFT, "duration": 1.0}
+    loaded = Scene(**scene, numerics=NUMERICS, conditions=[Fixed(edge("bottom")), Pulled(edge("top"))])
+    with pytest.raises(SceneError, match="cells takes no tractions"):
+        Simulation(loaded, device="cpu")
+    rk4 = Scene(**scene, numerics=Numerics(velocity_scheme="cells", source_scheme="rk4"))
+    with pytest.raises(SceneError, match="cells takes analytic only"):
+        Simulation(rk4, device="cpu")
