@@ -17,7 +17,7 @@ from .components import components
 from .faces import match_faces, row_keys
 from .kinds import CellKind
 from .mesh import Mesh
-from .overlap import TOUCHING, overlap
+from .overlap import TOUCHING, hanging, overlap
 
 FLAT = 1e-9  # a cell is flat whose Jacobian at a corner, over its longest edge to the d, is less
 ASLANT = (1.0, 2.0**0.5, 3.0**0.5)  # a direction in which the nodes of a lattice have places of their own
@@ -92,6 +92,11 @@ def check_faces(mesh: Mesh) -> None:
         _check_joints(mesh, owner, face, [(corner,) for corner in range(kind.corners)])
     if kind.dim > 2:
         _check_joints(mesh, owner, face, kind.edges)
+    stray = hanging(mesh)
+    if stray is not None:
+        node, corners = stray
+        allowed = f"it must not lie on a face whose corner it is not, of points {_listed(corners.tolist())}"
+        raise SceneError(f"points[{node}]", tuple(mesh.nodes[node].tolist()), allowed)
     place = overlap(mesh)
     if place is not None:
         at = ", ".join(f"{x:.4g}" for x in place)
