@@ -6,6 +6,7 @@ import pytest
 import warp as wp
 
 from tests.documents import LAW, ROOT, blocks, run_as_module
+from tests.undrawn import as_a_dot
 from warpsph.scene.registry import KERNELS, MATERIALS, SCHEMES, register
 from warpsph.simulation.device import start_warp
 
@@ -27,6 +28,12 @@ def device(request):
 def precision(request):
     """Both precisions."""
     return request.param
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Pictures are files of one dot: for tests about other things."""
+    as_a_dot(monkeypatch)
 
 
 @pytest.fixture

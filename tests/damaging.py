@@ -11,6 +11,9 @@ import sys
 import traceback
 from pathlib import Path
 
+import pytest
+
+from tests.undrawn import as_a_dot
 from warpsph.cli.main import main
 
 SCENE = '''"""Plate that is pulled; a signal comes after 20 steps."""
@@ -134,6 +137,7 @@ def damaged(folder, count, seed):
 
 
 if __name__ == "__main__":
+    as_a_dot(pytest.MonkeyPatch())
     wrong = damaged(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
     print("\n".join(wrong), file=sys.stderr)
     sys.exit(len(wrong) > 0)

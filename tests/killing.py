@@ -13,7 +13,6 @@ from tests.test_restart import finish, resumed, slope, started
 from warpsph.simulation.checkpoint import CHECKPOINT, Checkpoint, Checkpoints, Interval
 from warpsph.storage.files import write_whole
 
-KILLS = 50
 FOREVER = None
 
 
@@ -45,8 +44,8 @@ def killed(folder, life):
     return os.WIFSIGNALED(status)
 
 
-def main(folder):
-    """Returns the number of checkpoints that were gone on from."""
+def main(folder, most):
+    """Kill it so often. Returns the number of checkpoints that were gone on from."""
     whole, broken = folder / "whole", folder / "broken"
     whole.mkdir(), broken.mkdir()
     run_to_the_end(whole)
@@ -55,7 +54,7 @@ def main(folder):
     killed(broken, FOREVER)
     longest_life = 0.5 * (time.perf_counter() - begin)  # half a run, on this machine as busy as it is now
     chance, kills, steps = random.Random(1), 0, set()
-    while kills < KILLS:
+    while kills < most:
         kills += killed(broken, chance.uniform(0.0, longest_life))
         if (broken / "final.npz").exists():  # it was faster: from the start again
             check_final(whole, broken)
@@ -79,4 +78,4 @@ def check_final(whole, broken):
 
 
 if __name__ == "__main__":
-    print(main(Path(sys.argv[1])))
+    print(main(Path(sys.argv[1]), int(sys.argv[2])))

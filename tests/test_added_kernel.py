@@ -14,6 +14,8 @@ from warpsph.physics.smoothing import cubic_spline
 from warpsph.scene.parameter import numerical_parameters
 from warpsph.scene.scheme import SCHEMES
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FILE = """
 from warpsph import Box, Elastic, Scene, SmoothingKernel, register
 from warpsph.physics.smoothing import wendland_c2

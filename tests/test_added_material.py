@@ -34,6 +34,8 @@ from warpsph.mesh.continuum import CONTINUA
 from warpsph.scene.document import decode, encode
 from warpsph.scene.fingerprint import fingerprint
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TIME, SHEAR = 0.01, 1e6 / 2.6  # τ [s], G [Pa]
 
 

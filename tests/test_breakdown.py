@@ -22,6 +22,8 @@ from warpsph import (
 from warpsph.cli.main import main
 from warpsph.simulation import breakdown
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
 GRAVITY = 9.81
 

@@ -18,6 +18,8 @@ from warpsph.cli.main import main
 from warpsph.cli.runner import table
 from warpsph.scene.check import Check
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 # A bar of ten cells, Δt = 0.5 ms, pulled at its end; {extra} goes into the Scene, {more} to the end.
 USER_SCENE = '''"""Bar of a user."""
 from __future__ import annotations
@@ -163,8 +165,7 @@ def test_whole_run_writes_summary_history_and_pictures(tmp_path, capsys):
     assert header == ["step [-]", "time [s]", "end_stress [Pa]"]
     assert [int(row[0]) for row in samples] == list(range(steps + 1))
     assert np.allclose([float(row[1]) for row in samples], np.arange(steps + 1) * cell / speed, rtol=1e-9)
-    for name in ("history.png", "field.png"):
-        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    assert (folder / "history.png").is_file() and (folder / "field.png").is_file()
 
 
 def test_failed_check_exits_with_1(user_file, tmp_path, capsys):

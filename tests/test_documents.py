@@ -30,7 +30,7 @@ def everywhere(language):
 
 
 @pytest.mark.parametrize("block", everywhere("python"))
-def test_python_runs(block, maxwell, registered, tmp_path, monkeypatch):
+def test_python_runs(block, maxwell, registered, undrawn, tmp_path, monkeypatch):
     """A scene file also as `warpsph run` does it, with its checks."""
     monkeypatch.chdir(tmp_path)
     if callable(getattr(run_as_module("block", block, tmp_path), "scene", None)):
@@ -155,7 +155,7 @@ def test_places_of_the_docs_that_the_code_refers_to_exist():
                 assert anchor in anchors(ROOT / page), f"{path.relative_to(ROOT)}: {page}#{anchor}"
 
 
-def test_what_a_run_writes_is_in_the_docs(tmp_path):
+def test_what_a_run_writes_is_in_the_docs(undrawn, tmp_path):
     """Its files, the keys of its summary, the tables of its scene as data."""
     assert (
         main(["run", "elastic_bar", "--until", "1e-3", "--device", "cpu", "--quiet", "--out", str(tmp_path)]) == 0

@@ -9,6 +9,8 @@ from warpsph import Simulation
 from warpsph.cli.catalogue import load, shipped
 from warpsph.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def run_and_check(name, settings, out):
     """Runs a scene with its checks; their values by name."""

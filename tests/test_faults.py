@@ -230,6 +230,7 @@ def test_kernel_cache_that_nobody_may_write_is_replaced_and_said_in_one_line(for
     assert list(Path(re.fullmatch(CACHE_LINE, errors)[1]).rglob("*.o")), "compiled there"
 
 
+@pytest.mark.long
 def test_two_runs_that_compile_at_once_both_end_right(tmp_path):
     """Into one empty kernel cache."""
     environment = os.environ | {"WARP_CACHE_PATH": str(tmp_path / "cache")}

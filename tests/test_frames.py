@@ -31,6 +31,8 @@ from warpsph.export.walls import WallMesh, walls_of
 from warpsph.frames import Frames, FrameWriter, evenly
 from warpsph.simulation.history import read_history
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def block(**changes):
     """A block 0.4 m by 0.2 m, pressed from above; Δt = 0.23 ms."""

@@ -7,7 +7,7 @@ import pytest
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="it looks for processes in /proc")
-@pytest.mark.parametrize("count", [8, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [6, pytest.param(100, marks=pytest.mark.long)])
 def test_killed_commands_lose_nothing(count, tmp_path):
     """Runs, resumed runs, exports and pictures; in the long form sweeps and reports as well."""
     command = [sys.executable, "-m", "tests.killing_commands", str(tmp_path), str(count), "1"]

@@ -18,6 +18,8 @@ from warpsph.cli.main import main
 from warpsph.storage import owner
 from warpsph.storage.owner import MARK, owned, owned_file
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SLOW = SCENE.replace("if s.steps == 20", "import time; time.sleep(0.02)\n    if s.steps == 20").replace(
     "duration=0.01", "duration=10.0"
 )

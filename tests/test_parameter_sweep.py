@@ -131,16 +131,19 @@ def test_sweep_survives_its_members_and_tells_all_of_them_in_one_table(bar, tmp_
 
 
 def test_only_what_is_missing_is_made(bar, tmp_path, capsys):
-    """Another value, a changed scene file, another precision: those are; what is done is not."""
+    """Another value, frames, a changed scene file, another precision: those are; what is done is not."""
     assert sweep("--set", "velocity=1", "--out", "out") == 0
+    member = Member("velocity=1", str(tmp_path / "bar.py"), ("velocity=1",))
+    folder = tmp_path / "out" / "runs" / "velocity=1"
+    assert member.done(folder) and not (folder / "frames").exists()
+    assert not Member(member.name, member.scene, member.settings, "float32").done(folder)
+    assert not Member(member.name, member.scene, ("velocity=1", "courant=0.5")).done(folder)
     assert sweep("--set", "velocity=1,2", "--out", "out") == 0
     out = capsys.readouterr().out
     assert "2 runs, 1 of them done already" in out and "[1/1] velocity=2" in out
-    member = Member("velocity=1", str(tmp_path / "bar.py"), ("velocity=1",))
-    folder = tmp_path / "out" / "runs" / "velocity=1"
-    assert member.done(folder)
-    assert not Member(member.name, member.scene, member.settings, "float32").done(folder)
-    assert not Member(member.name, member.scene, ("velocity=1", "courant=0.5")).done(folder)
+    assert sweep("--set", "velocity=1", "--out", "out", "--frames", "2") == 0
+    assert len(list((folder / "frames").glob("0*.npz"))) == 3
+    assert sweep("--out", "out", "--frames", "few") == 2
     (tmp_path / "bar.py").write_text(SCENE + "# changed\n")
     assert not member.done(folder)
 
@@ -263,12 +266,3 @@ def test_member_without_a_log_says_so(tmp_path):
     assert last_line(tmp_path) == "it left no log"
     with pytest.raises(SceneError):
         members("no_such_scene", [], "float64")
-
-
-def test_members_keep_no_frames_unless_asked(bar, tmp_path):
-    """Those that have none are made again when frames are asked for."""
-    asked = ("--set", "velocity=1", "--out", "out", "--quiet")
-    frames = tmp_path / "out" / "runs" / "velocity=1" / "frames"
-    assert sweep(*asked) == 0 and not frames.exists()
-    assert sweep(*asked, "--frames", "2") == 0 and len(list(frames.glob("0*.npz"))) == 3
-    assert sweep(*asked, "--frames", "few") == 2

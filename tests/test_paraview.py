@@ -10,6 +10,8 @@ from warpsph import Box, Elastic, FreeSurface, PrescribedVelocity, Scene, Simula
 from warpsph.cli.main import main
 from warpsph.frames import Frames, FrameWriter, evenly
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 # Stress components in VTK's order XX, YY, ZZ, XY, YZ, XZ; one number each that can not be mistaken.
 STRESS = {1: (1.0,), 2: (1.0, 2.0, 12.0, 3.0), 3: (1.0, 2.0, 3.0, 12.0, 13.0, 23.0)}
 IN_VTK = {1: (1, 0, 0, 0, 0, 0), 2: (1, 2, 3, 12, 0, 0), 3: (1, 2, 3, 12, 23, 13)}

@@ -40,6 +40,12 @@ def coloured(path):
     return float((np.ptp(pixels, axis=2) > 20).mean())
 
 
+def test_run_leaves_its_curve_and_its_last_field(run):
+    """Where it has a probe; a picture without anything on it has no colours, a line some."""
+    drawn = [path for path in (run / "field.png", run / "history.png") if path.exists()]
+    assert run / "field.png" in drawn and all(coloured(path) > 0.002 for path in drawn)
+
+
 def test_overview_of_a_run(run, capsys):
     assert main(["plot", str(run)]) == 0
     path = run / "overview.png"

@@ -333,9 +333,10 @@ def test_checkpoints_come_at_their_interval(interval, steps, tmp_path, monkeypat
     assert found == list(steps)
 
 
-def test_killed_fifty_times_a_run_still_ends_where_it_should(tmp_path):
+@pytest.mark.parametrize("kills", [8, pytest.param(50, marks=pytest.mark.long)])
+def test_run_that_is_killed_again_and_again_still_ends_where_it_should(kills, tmp_path):
     """By SIGKILL at random moments: a whole checkpoint or none, whole rows, the same end to the last bit."""
-    command = [sys.executable, "-m", "tests.killing", str(tmp_path)]
+    command = [sys.executable, "-m", "tests.killing", str(tmp_path), str(kills)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) >= 10, "it went on from that many different checkpoints"
+    assert int(done.stdout) >= kills // 5, "it went on from that many different checkpoints"

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from warpsph.cli.main import main
 from warpsph.cli.stored import open_scene
 from warpsph.scene.fingerprint import fingerprint
 from warpsph.storage.reading import read_toml
+
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 # {stop} runs after each step: it may send the process a signal.
 SCENE = '''"""Block under gravity."""
@@ -77,6 +80,18 @@ def block(tmp_path):
         return "block.py"
 
     return write
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    """A folder with the scene file, the run `out` that was stopped, and `early`, which has no checkpoint."""
+    folder = tmp_path_factory.mktemp("stopped")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        Path("block.py").write_text(SCENE.format(stop="os.kill(os.getpid(), signal.SIGTERM)"))
+        assert run("block.py", "--set", "stop_at=9", "--out", "out") == 128 + signal.SIGTERM
+        shutil.copytree("out", "early", ignore=shutil.ignore_patterns("checkpoint.npz"))
+    return folder
 
 
 def run(*arguments):
@@ -153,11 +168,8 @@ def test_checkpoints_are_written_as_asked_and_a_new_run_begins_anew(block, tmp_p
         (["block.py", "--checkpoint-every=-3s"], "--checkpoint-every = '-3s' "),
     ],
 )
-def test_wrong_restart_is_refused_in_one_line(arguments, message, block, capsys):
-    block()
-    assert run("block.py", "--set", "stop_at=9", "--out", "out") == 128 + signal.SIGTERM
-    shutil.copytree("out", "early", ignore=shutil.ignore_patterns("checkpoint.npz"))
-    capsys.readouterr()
+def test_wrong_restart_is_refused_in_one_line(arguments, message, stopped, monkeypatch, capsys):
+    monkeypatch.chdir(stopped)
     assert run(*arguments) == 2
     assert re.search(message, one_line(capsys))
 

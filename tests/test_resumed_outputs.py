@@ -15,6 +15,8 @@ from warpsph.frames import Frames
 from warpsph.simulation.checkpoint import Checkpoint
 from warpsph.storage.reading import read_toml
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENE = '''"""Block that is pressed; a signal comes after the step `stop_at`."""
 import os, signal
 from warpsph import *

@@ -14,7 +14,7 @@ RUN = ("run", "plate.py", "--device", "cpu", "--quiet", "--out", "out", "--overw
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="it looks for processes in /proc")
-@pytest.mark.parametrize("count", [6, pytest.param(150, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.long)])
 def test_signals_at_any_moment_of_any_command(count, tmp_path):
     """Starting, running, writing, ending; runs, resumed runs, exports, pictures; in the long form sweeps, reports,
     and kernels being built. What goes on afterwards ends as if there had been no signal."""

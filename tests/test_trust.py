@@ -15,6 +15,8 @@ from warpsph.cli.run_folder import stage_inside
 from warpsph.errors import SceneError
 from warpsph.frames import Frames
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CODE = 'open("executed", "w").close()\n' + SCENE.split("\n", 1)[1]
 
 

@@ -18,6 +18,8 @@ from warpsph.cli.main import main
 from warpsph.export.usd_live import LiveStage
 from warpsph.frames import Frames
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TOOL = Path(__file__).parent.parent / "tools" / "check_usd.py"
 SPACING, FRAMES = 0.1, 8
 SCENE = '''"""A body pressed by a plate at 1 m/s, under gravity."""

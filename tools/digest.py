@@ -46,7 +46,7 @@ from warpsph.device import compiling
 
 STEPS = 200
 EXACT_FLAGS = "-ffp-contract=off -mstackrealign"  # IEEE arithmetic as it is written
-SCHEMES = ("compatible", "blanc-pastor", "taylor")
+SCHEMES = ("compatible", "blanc-pastor", "taylor", "cells")
 SPACING = {1: 0.005, 2: 0.0625, 3: 0.2}
 SOFT = {"young_modulus": 1e6, "poisson_ratio": 0.3, "density": 2000.0}
 CLAY = {"fluidity": 2.0, "yield_size": 4e3, "hardening": -1e3}

@@ -18,18 +18,36 @@ from ..errors import DamagedError
 from ..simulation.device import THREADS, all_cores
 from .parent import end_with_parent, for_child
 from .scene_run import SceneRun
+from .stopping import TERMINAL, terminal_waits
+
+try:
+    from multiprocessing import resource_tracker
+except ImportError:  # not on Windows
+    resource_tracker = None
 
 POLL = 1.0  # [s]
 MANY = 500  # runs; of more it would take too long to find how much work each is
 AT_ONCE = 256  # runs handed out: as many as any machine or cluster makes side by side
 
 
+class Processes(ProcessPoolExecutor):
+    """Processes of this machine, which leave the signals of the terminal to this one from their start."""
+
+    def submit(self, *arguments, **named):
+        """As of every executor; it may start a process."""
+        with terminal_waits():
+            return super().submit(*arguments, **named)
+
+
 def processes(jobs: int) -> Executor:
     """Makes each run in a process of this machine, which share the cores and end with this one."""
+    if resource_tracker is not None:
+        with terminal_waits():
+            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     threads = max(1, all_cores() // jobs)
     arguments = (threads, for_child())
-    return ProcessPoolExecutor(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
+    return Processes(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
 
 
 def make_missing(
@@ -124,7 +142,8 @@ class _Queue:
 
 
 def _begin(threads: int, environment: Mapping[str, str]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's business
+    for each in TERMINAL:  # the parent's business
+        signal.signal(each, signal.SIG_IGN)
     os.environ.setdefault(THREADS, str(threads))
     os.environ.update(environment)
     end_with_parent()

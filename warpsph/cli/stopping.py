@@ -11,8 +11,9 @@ from ..errors import StoppedError
 from ..simulation.checkpoint import Checkpoints
 from ..simulation.simulation import Simulation
 
-# Ctrl-C, a request to end, a terminal that was closed.
-SIGNALS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+# Ctrl-C and a terminal that was closed: every process of the terminal gets them.
+TERMINAL = (signal.SIGINT, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+SIGNALS = (*TERMINAL, signal.SIGTERM)  # and a request to end
 
 
 @contextlib.contextmanager
@@ -64,6 +65,19 @@ def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
 
     with handled(stop):
         yield
+
+
+@contextlib.contextmanager
+def terminal_waits() -> Iterator[None]:
+    """Signals of the terminal wait meanwhile; processes that are started meanwhile begin deaf to them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, TERMINAL)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
 
 class Stopper:

@@ -32,6 +32,8 @@ class StressFunctions:
         spherical: p → p 1 as stored, σ33 of plane strain included; p in a bar.
         transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
         norm: σ → √(σ : σ).
+        traction: (σ, n) → σ n.
+        complementary: (σ, σ', λ, G, E) → σ : Dₑ⁻¹ : σ', twice the elastic energy a volume has where σ = σ'.
     """
 
     elastic_rate: wp.Function
@@ -45,6 +47,8 @@ class StressFunctions:
     spherical: wp.Function
     transform: wp.Function
     norm: wp.Function
+    traction: wp.Function
+    complementary: wp.Function
 
 
 @cache
@@ -100,7 +104,17 @@ def _bar(types: NodeTypes, real: type) -> StressFunctions:
     def norm(sigma: types.stress):
         return wp.abs(sigma[0])
 
+    @wp.func
+    def traction(sigma: types.stress, normal: types.vector):
+        return types.vector(sigma[0] * normal[0])
+
+    @wp.func
+    def complementary(a: types.stress, b: types.stress, lame: real, shear: real, young: real):
+        return a[0] * b[0] / young
+
     return StressFunctions(
+        traction=traction,
+        complementary=complementary,
         elastic_rate=elastic_rate,
         divergence=divergence,
         spin=spin,
@@ -131,6 +145,17 @@ def _flow(types: NodeTypes, real: type, mean: wp.Function, spherical: wp.Functio
         return real(3.0) * shear
 
     return {"deviator": deviator, "relaxation": relaxation, "relaxation_modulus": relaxation_modulus}
+
+
+def _complementary(types: NodeTypes, real: type, mean: wp.Function, double_dot: wp.Function) -> wp.Function:
+    """σ : Dₑ⁻¹ : σ' = (σ : σ' − ν/(1 + ν) tr σ tr σ')/2G, ν/(1 + ν) = λ/(3λ + 2G)."""
+
+    @wp.func
+    def complementary(a: types.stress, b: types.stress, lame: real, shear: real, young: real):
+        share = real(9.0) * lame / (real(3.0) * lame + real(2.0) * shear)
+        return (double_dot(a, b) - share * mean(a) * mean(b)) / (real(2.0) * shear)
+
+    return complementary
 
 
 def _plane_strain(types: NodeTypes, real: type) -> StressFunctions:
@@ -181,7 +206,17 @@ def _plane_strain(types: NodeTypes, real: type) -> StressFunctions:
     def norm(sigma: types.stress):
         return wp.sqrt(wp.dot(sigma, sigma) + sigma[2] * sigma[2])
 
+    @wp.func
+    def traction(sigma: types.stress, n: types.vector):
+        return types.vector(sigma[0] * n[0] + sigma[2] * n[1], sigma[2] * n[0] + sigma[1] * n[1])
+
+    @wp.func
+    def double_dot(a: types.stress, b: types.stress):
+        return wp.dot(a, b) + a[2] * b[2]
+
     return StressFunctions(
+        traction=traction,
+        complementary=_complementary(types, real, mean, double_dot),
         elastic_rate=elastic_rate,
         divergence=divergence,
         spin=spin,
@@ -249,7 +284,17 @@ def _solid(types: NodeTypes, real: type) -> StressFunctions:
         shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
         return wp.sqrt(wp.dot(sigma, sigma) + shear2)
 
+    @wp.func
+    def traction(sigma: types.stress, n: types.vector):
+        return tensor(sigma) * n
+
+    @wp.func
+    def double_dot(a: types.stress, b: types.stress):
+        return wp.dot(a, b) + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
     return StressFunctions(
+        traction=traction,
+        complementary=_complementary(types, real, mean, double_dot),
         elastic_rate=elastic_rate,
         divergence=divergence,
         spin=spin,

@@ -27,6 +27,7 @@ class Numerics:
             docs/velocity_steps.md, "What still fails".
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
         velocity_scheme: the name of a scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md),
+            `cells` (energy-conjugate, any kind of cell; docs/method.md, section 8),
             `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.

@@ -49,7 +49,7 @@ def _row(record: object) -> tuple[dict, str, str]:
     if isinstance(record, SmoothingKernel):
         return KERNELS, record.name, _place(record.weights)
     if isinstance(record, Scheme):
-        return SCHEMES, record.name, _place(record.fluxes)
+        return SCHEMES, record.name, _place(record.stepper or record.fluxes)
     raise SceneError("register", record, "it must be a subclass of Material, a SmoothingKernel or a Scheme")
 
 

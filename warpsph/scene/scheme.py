@@ -43,8 +43,8 @@ class Scheme:
     Attributes:
         name: what `Numerics.velocity_scheme` calls it.
         meaning: one line.
-        fluxes: makes its `Fluxes`.
-        motion: makes what moves the nodes (`warpsph.operators.motion`).
+        fluxes: makes its `Fluxes`; None where `stepper` has passes of its own.
+        motion: makes what moves the nodes (`warpsph.operators.motion`); None where `stepper` moves them.
         unloads: whether free edges lose their tractions by elastic unloading, and an edge without a condition is
             free; if not, they are cut off, and such an edge keeps what traction it has.
         follows_cells: whether kernels are stretched and turned with the cells, and so reach a stretched cell's
@@ -52,17 +52,21 @@ class Scheme:
         courant_limit: (number of dimensions, m₂ [-]) → largest stable c_p Δt/Δx.
         largest_support: of a body of so many dimensions, radius over spacing [-].
         kinds: kinds of cell it can take.
+        stepper: makes what advances a scene, a `warpsph.step.step.Stepper`; None for sums over neighbours.
+        spacing: mesh → Δx of the Courant number [m].
     """
 
     name: str
     meaning: str
-    fluxes: Callable[..., Fluxes]
-    motion: Callable
+    fluxes: Callable[..., Fluxes] | None
+    motion: Callable | None
     unloads: bool
     follows_cells: bool
     courant_limit: Callable[[int, float], float]
     largest_support: Callable[[int], float]
     kinds: tuple[CellKind, ...] = tuple(GRID_KINDS.values())
+    stepper: Callable | None = None
+    spacing: Callable[[Mesh], float] = Mesh.smallest_distance
 
     def check_cells(self, mesh: Mesh) -> None:
         """Refuse cells of a kind that the scheme's sums do not know.

@@ -32,8 +32,12 @@ class Field:
     available: Callable[[object], bool] = lambda scene: True
 
 
+def _sums_over_neighbours(scene) -> bool:
+    return scene.numerics.scheme.stepper is None
+
+
 def _has_free_surface(scene) -> bool:
-    return scene.free_surface is not None
+    return scene.free_surface is not None and _sums_over_neighbours(scene)
 
 
 def _phi(simulation) -> np.ndarray:
@@ -69,9 +73,9 @@ FIELDS: dict[str, Field] = {
         "Green-Lagrange strain, components as of the stress",
         lambda s: green_strain(s.mesh, s.nodes.displacement.numpy()),
     ),
-    "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.nodes.density.numpy().copy()),
+    "density": Field("kg/m³", "(n,)", "density ρ", lambda s: s.stepper.body.density()),
     "smoothing_length": Field(
-        "m", "(n,)", "smoothing length h", lambda s: s.nodes.smoothing_length.numpy().copy()
+        "m", "(n,)", "smoothing length h", lambda s: s.nodes.smoothing_length.numpy().copy(), _sums_over_neighbours
     ),
     "velocity_gradient": Field(
         "1/s", "(n, d, d)", "L = ∂v_i/∂x_j of v^{n+1/2}", lambda s: s.nodes.velocity_gradient.numpy().copy()

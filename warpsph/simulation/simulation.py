@@ -18,7 +18,7 @@ from ..physics.space import Space
 from ..scene.place import node_at
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
-from ..step.step import Stepper
+from ..step.sums import SumsStepper
 from ..validate import instance, number
 from .breakdown import FLATTENED, LEAST_STEP_SHARE, breakdown
 from .device import choose_device, choose_threads
@@ -81,10 +81,11 @@ class Simulation:
         self.precision = precision_of(precision)
         self.device = choose_device(device)
         self.mesh = scene.mesh
-        self._time_step = TimeStep(scene, lambda: self.stepper.lists.shrinkage)
+        self._time_step = TimeStep(scene, lambda: self.stepper.shrinkage)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        self.stepper = Stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
+        stepper = scene.numerics.scheme.stepper or SumsStepper
+        self.stepper = stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
         body = self.stepper.body
         self.nodes, self.auxiliary, self.internals = body.nodes, body.auxiliary, body.internals
         self.conditions = self.stepper.conditions
@@ -154,7 +155,7 @@ class Simulation:
         self.shortest_step = min(self.shortest_step, dt)
         self.longest_step = max(self.longest_step, dt)
         self.wall_time += clock.perf_counter() - begin
-        fault = outcome.fault or (FLATTENED if self.stepper.lists.shrinkage < LEAST_STEP_SHARE else None)
+        fault = outcome.fault or (FLATTENED if self.stepper.shrinkage < LEAST_STEP_SHARE else None)
         if fault is not None:
             raise breakdown(self, fault, dt)
 
@@ -207,4 +208,4 @@ class Simulation:
     @property
     def list_builds(self) -> int:
         """How often the pair lists were built."""
-        return self.stepper.lists.builds
+        return self.stepper.builds

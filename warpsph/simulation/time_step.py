@@ -63,7 +63,9 @@ class TimeStep:
 
     def __init__(self, scene: Scene, shrinkage: Callable[[], float]):
         self._initial_limit, self._shrinkage = time_step_limit(scene), shrinkage
-        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.mesh.smallest_distance()  # [1/s]
+        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.numerics.scheme.spacing(
+            scene.mesh
+        )  # [1/s]
         self.stretch: Stretch | None = None
 
     @property
@@ -111,7 +113,7 @@ def time_step_limit(scene: Scene) -> float:
         SceneError: the Courant number (or the given time step) is beyond the wave limit.
     """
     numerics, material, mesh = scene.numerics, scene.material, scene.mesh
-    per_courant = mesh.smallest_distance() / material.wave_speed(mesh.dim)
+    per_courant = numerics.scheme.spacing(mesh) / material.wave_speed(mesh.dim)
     limit = courant_limit(scene)
     if numerics.time_step is not None:
         if numerics.time_step > limit * per_courant * (1.0 + ROUNDING):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
@@ -44,6 +45,10 @@ class Body:
     slots: bool
     node_cells: NodeCells
     launcher: Launcher
+
+    def density(self) -> np.ndarray:
+        """ρ of the nodes [kg/mᵈ], shape (n,)."""
+        return self.nodes.density.numpy().copy()
 
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> Body:

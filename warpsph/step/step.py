@@ -1,76 +1,51 @@
-"""The time step of the Runge-Kutta Taylor SPH method (METHOD section 3, Table I of Blanc and Pastor 2012)."""
+"""What every scheme's stepper has in common: many steps recorded once, and made without a word from the host."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-import warp as wp
-
-from ..device.compiling import load_kernels
 from ..device.launching import Launcher, Recording
-from ..operators.conditions import Conditions
-from ..operators.sources import sources
-from ..operators.surface.release import FreeSurfaceConditions
-from ..physics.space import Space
-from ..scene.scene import Scene
-from ..state.body import Body
 from ..state.clock import Clock, Outcome
-from .lists import PairLists
+from ..state.part import Part
 
 
-class Stepper:
+class Stepper(ABC):
     """The state of a scene on a device, and the functions that advance it.
 
     Args:
-        scene: the scene.
-        space: the continuum and the precision.
         launcher: launches the kernels.
+        clock: what differs from step to step.
+        parts: what the host renews now and then, each after those that it depends on.
 
     Attributes:
         body: nodes, cells and material.
-        conditions: boundary conditions, `Conditions` or `FreeSurfaceConditions`.
-        clock: what differs from step to step.
-        lists: the pair lists and what moves the nodes.
-        fluxes: the waves, steps 3-10, of the scene's scheme.
-        parts: what the host renews now and then, each after those that it depends on.
+        conditions: boundary conditions.
+        clock, parts: those given.
+        builds: how often lists of neighbours were built.
     """
 
-    def __init__(self, scene: Scene, space: Space, launcher: Launcher):
-        scheme, device = scene.numerics.scheme, launcher.device
-        self.body = Body.of(scene, space, launcher)
-        self.clock = Clock(scene.body_force, scene.boundary.functions, space, launcher)
-        self.lists = PairLists(self.body, self.clock)
-        self._sources = sources(scene, self.body.law, self.body.parameters, space, launcher)
-        if scene.free_surface is None:
-            turns = scheme.unloads and scene.large_displacements and space.dim > 1
-            self.conditions = Conditions(
-                scene.boundary,
-                len(scene.mesh.nodes),
-                space=space,
-                launcher=launcher,
-                clock=self.clock,
-                moves=scene.large_displacements,
-                turns=turns,
-            )
-        else:
-            self.conditions = FreeSurfaceConditions(
-                scene, self.body.nodes, space=space, launcher=launcher, clock=self.clock
-            )
-        self.fluxes = scheme.fluxes(
-            self.body,
-            conditions=self.conditions,
-            around_auxiliary=self.lists.around_auxiliary,
-            around_nodes=self.lists.around_nodes,
-        )
+    builds = 0
+
+    def __init__(self, launcher: Launcher, clock: Clock, *, parts: Sequence[Part]):
+        self.clock, self.parts, self._launcher = clock, tuple(parts), launcher
         self._recording: Recording | None = None
         self._recorded: tuple[int, ...] = ()
-        self.parts = (self.lists, self.conditions)
-        pieces = (self.clock, self._sources, self.fluxes, *self.parts)
-        load_kernels([kernel for piece in pieces for kernel in piece.kernels], device)
-        for part in self.parts:
-            part.refresh()
-        self.clock.begin([0.0], 0.0)
-        self.fluxes.set_courant(0.0)
-        self.conditions.apply(self.body.nodes)
-        self._initial_spin(scene)
+
+    @property
+    @abstractmethod
+    def shrinkage(self) -> float:
+        """Least time of a wave from node to node over the initial one, at most 1."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """Advance the nodes by the clock's Δt; it ends with the clock's tick."""
+
+    def set_courant(self, courant: float) -> None:
+        """The Courant number c_p Δt/Δx of the steps to come; most schemes need not know."""
+        return
+
+    def arrays_recorded(self) -> tuple[int, ...]:
+        """Addresses of arrays that may be replaced: the step is then recorded anew."""
+        return (0,)
 
     def advance(self, times: Sequence[float], dt: float, courant: float) -> Outcome:
         """Make a step from each of the times to Δt later; fewer when the host is needed before.
@@ -84,7 +59,7 @@ class Stepper:
             How many were made, at least one. When something can not be true, the last step is the first with it.
         """
         self.clock.begin(times, dt)
-        self.fluxes.set_courant(courant)
+        self.set_courant(courant)
         self._record().run()
         outcome = self.clock.outcome()
         if outcome.outdated is not None and outcome.fault is None:
@@ -92,32 +67,10 @@ class Stepper:
                 part.refresh()
         return outcome
 
-    def step(self) -> None:
-        """Advance the nodes by the clock's Δt; the numbers are those of METHOD section 3."""
-        nodes, internals, dt = self.body.nodes, self.body.internals, self.clock.time_step
-        self._sources.half_step(nodes, internals, self.clock.first_half, dt, ends=False)  # 1-2
-        self.conditions.turn(nodes, dt)
-        self.fluxes.to_auxiliary(dt)  # 3-6
-        self.fluxes.to_nodes(dt)  # 7-10
-        self._sources.half_step(nodes, internals, self.clock.second_half, dt, ends=True)  # 11-12
-        self.conditions.turn(nodes, dt)
-        self.conditions.apply(nodes)  # 13
-        self.lists.motion.move(dt)  # 14
-        self.clock.tick()
-
     def _record(self) -> Recording:
-        """The step, recorded anew where lists have got new arrays."""
-        content = tuple(pairs.index.ptr for pairs in (self.lists.around_auxiliary, self.lists.around_nodes))
+        """The step, recorded anew where it has got new arrays."""
+        content = self.arrays_recorded()
         if self._recorded != content:
-            self._recording = self.body.launcher.record(self.step, self.clock.going)
+            self._recording = self._launcher.record(self.step, self.clock.going)
             self._recorded = content
         return self._recording
-
-    def _initial_spin(self, scene: Scene) -> None:
-        """Velocity gradient of the initial state, for the spin of the very first source step."""
-        if not scene.initial_velocity.any():
-            return
-        start = wp.clone(self.body.nodes.point)
-        self.fluxes.to_auxiliary(self.clock.time_step)
-        self.fluxes.to_nodes(self.clock.time_step)
-        wp.copy(self.body.nodes.point, start)

@@ -1,0 +1,351 @@
+"""The five passes of a step of the scheme `cells` (METHOD section 8), over nodes and over cells by turns.
+
+A node's corner of a cell, the pair p = (T, i), is a point of the quadrature: it has the weight A_T/n, the gradient
+G_p, taken a share κ of the way to the corner, and the stress of the node. L_i = (1/V_i) Σ_p w_p G_p v, and the
+nodal force is its exact adjoint. What L does not see, G_p v − L_i, all the way to the corner, is rough: it meets a
+viscosity, no smooth motion does.
+"""
+
+from functools import cache
+
+import warp as wp
+
+from ..device.arrays import packed
+from ..device.compiling import forward_kernel
+from ..materials.law import Law
+from ..mesh.kinds import CellKind
+from ..physics.space import Space
+from ..state.cell_body import cell_node_types
+from ..state.cells import NodeCells, cell_in_slot, corner_place
+from ..state.clock import END, FOLDED, HALF, NON_FINITE, TOO_FAST
+from .cell_shape import CellShape, cell_shape
+from .held import held_types
+
+# κ of a grid's cells: with a stress at the edge nodes taken from 1 − κ halves of a cell inside, n cells bend with
+# 1 + (2 − 6 (1 − κ))/n² of their stiffness. Two thirds leave no error of second order.
+CORNER_SHARE = 2.0 / 3.0
+MOST_STRAIN = 0.02  # between two looks at the time step
+LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
+
+
+def numbers_of(space: Space, shape: CellShape) -> int:
+    """How many numbers the strain pass leaves of a cell: A/n, (A/n) G v, and the part of each mode of it."""
+    return 1 + space.dim**2 * (1 + shape.partial)
+
+
+@cache
+def kick_kernel(space: Space, moves: bool):
+    """v^{n+1/2} = e^{−cΔt/2} (v + ½Δt a), held; x^{n+1/2} = x + ½Δt v^{n+1/2}."""
+    real, CellNodes, (Held, hold) = space.real, cell_node_types(space)[1], held_types(space)
+    packed_nodes = packed(CellNodes)
+
+    @forward_kernel
+    def kick(first: int, held: Held, damping: real, time_step: wp.array(dtype=real), nodes: CellNodes):
+        i = first + wp.tid()
+        packed_nodes(nodes)
+        h = real(0.5) * time_step[0]
+        point = nodes.point[i]
+        pushed = space.phi.velocity(point.phi) + h * nodes.acceleration[i]
+        free = wp.exp(-damping * h) * pushed
+        v = hold(i, free, HALF, held)
+        nodes.half[i].v = v
+        if wp.static(moves):
+            nodes.half[i].x = point.x + h * v
+        else:
+            nodes.half[i].x = point.x
+        book = nodes.books[i]
+        book[1] += wp.float64(nodes.mass[i] * wp.dot(v - free, v))
+        nodes.books[i] = book
+
+    return kick
+
+
+@cache
+def strain_kernel(space: Space, kind: CellKind):
+    """Of each cell, at the half step: A/n, (A/n) G v, and what its hourglass modes add to it."""
+    real, types, d = space.real, space.types, space.dim
+    shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
+    per_corner, T = 1.0 / kind.corners, shape.weights
+    packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
+    packed_numbers = packed(wp.array2d(dtype=real))
+
+    @forward_kernel
+    def strain(
+        first: int,
+        corners: wp.array2d(dtype=wp.int32),
+        nodes: CellNodes,
+        numbers: wp.array2d(dtype=real),
+        faults: wp.array(dtype=wp.int32),
+    ):
+        c = first + wp.tid()
+        packed_nodes(nodes)
+        packed_table(corners)
+        packed_numbers(numbers)
+        x, v = shape.Modes(), shape.Modes()
+        for k in range(wp.static(kind.corners)):
+            i = corners[c, k]
+            half = nodes.half[i]
+            x += wp.outer(T[k], half.x)
+            v += wp.outer(T[k], half.v)
+        B, volume, frame = shape.measure(x)
+        if not volume > real(0.0):
+            faults[FOLDED] = 1
+        share = real(per_corner) * volume
+        weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
+        numbers[c, 0] = share
+        for a in range(wp.static(d)):
+            for b in range(wp.static(d)):
+                numbers[c, wp.static(1) + d * a + b] = weighted[a, b]
+        if wp.static(shape.partial > 0):
+            G = weighted / share
+            for p in range(wp.static(shape.partial)):
+                part = types.tensor()
+                for q in range(wp.static(len(shape.links))):
+                    if wp.static(shape.links[q][2] == p):
+                        bend = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
+                        part += wp.outer(bend, frame[wp.static(shape.links[q][1])])
+                for a in range(wp.static(d)):
+                    for b in range(wp.static(d)):
+                        numbers[c, 1 + d * d * (1 + p) + d * a + b] = share * part[a, b]
+
+    return strain
+
+
+@cache
+def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bool):
+    """V and L of each node from its cells; σ turned, strained and relaxed; the node moves on to t^{n+1}."""
+    real, types, d = space.real, space.types, space.dim
+    shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
+    internal, remembers = space.vec(max(1, len(law.internals))), len(law.internals) > 0
+    cell_at, place_of = cell_in_slot(kind), corner_place(kind)
+    sign = shape.signs
+    packed_nodes, packed_numbers = packed(CellNodes), packed(wp.array2d(dtype=real))
+
+    @wp.func
+    def corner_gradient(c: int, k: int, numbers: wp.array2d(dtype=real)):
+        g = types.tensor()
+        for a in range(wp.static(d)):
+            for b in range(wp.static(d)):
+                g[a, b] = numbers[c, 1 + d * a + b]
+                for p in range(wp.static(shape.partial)):
+                    g[a, b] += real(CORNER_SHARE) * sign[k, p] * numbers[c, 1 + d * d * (1 + p) + d * a + b]
+        return g
+
+    @forward_kernel
+    def stress(
+        first: int,
+        material: law.Parameters,
+        least_volume: real,
+        time_step: wp.array(dtype=real),
+        table: NodeCells,
+        numbers: wp.array2d(dtype=real),
+        nodes: CellNodes,
+        internals: wp.array(dtype=internal),
+        outdated: wp.array(dtype=wp.int32),
+        faults: wp.array(dtype=wp.int32),
+    ):
+        i = first + wp.tid()
+        packed_nodes(nodes)
+        packed_numbers(numbers)
+        dt, volume, weighted = time_step[0], real(0.0), types.tensor()
+        if wp.static(slots):
+            for k in range(wp.static(kind.corners)):
+                c = cell_at(i, k, table)
+                if c >= 0:
+                    volume += numbers[c, 0]
+                    weighted += corner_gradient(c, k, numbers)
+        else:  # the same, entry by entry
+            for entry in range(table.first[i], table.first[i + 1]):
+                c, k = place_of(entry, table)
+                volume += numbers[c, 0]
+                weighted += corner_gradient(c, k, numbers)
+        volume = wp.max(volume, least_volume * nodes.mass[i])
+        L = weighted / volume
+        rate = space.stress.elastic_rate(L, material.lame, material.shear, material.young)
+        half, point = nodes.half[i], nodes.point[i]
+        turned = space.phi.stress(point.phi)
+        if wp.static(moves and d > 1):
+            turned = space.stress.transform(turned, space.algebra.rotation(L, dt))
+        trial = turned + dt * rate
+        sigma = trial
+        if wp.static(law.flows):
+            own = internal()
+            if wp.static(remembers):
+                own = internals[i]
+            sigma, own = law.relax(trial, own, material, dt)
+            if wp.static(remembers):
+                internals[i] = own
+            mean, lost = real(0.5) * (turned + sigma), trial - sigma
+            work = space.stress.complementary(mean, lost, material.lame, material.shear, material.young)
+            book = nodes.books[i]
+            book[2] += wp.float64(volume * work)
+            nodes.books[i] = book
+        u = nodes.displacement[i] + dt * half.v
+        nodes.displacement[i] = u
+        if wp.static(moves):
+            nodes.point[i].x = nodes.reference[i] + u
+            d_dt = real(0.5) * dt * (L + wp.transpose(L))
+            strained = nodes.strained[i] + wp.sqrt(wp.ddot(d_dt, d_dt))
+            nodes.strained[i] = strained
+            if strained > real(MOST_STRAIN):
+                outdated[0] = 1
+            if not wp.ddot(L, L) * dt * dt < real(1.0):
+                faults[TOO_FAST] = 1
+        nodes.point[i].phi = space.phi.with_stress(point.phi, sigma)
+        nodes.volume[i] = volume
+        nodes.velocity_gradient[i] = L
+        nodes.elastic_rate[i] = rate
+
+    return stress
+
+
+@cache
+def force_kernel(space: Space, kind: CellKind, law: Law):
+    """Of each cell, at t^{n+1}: what its stress, and the viscosity that rough motion meets, do to its corners."""
+    real, types, d, n = space.real, space.types, space.dim, kind.corners
+    shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
+    T, per_corner, size = shape.weights, 1.0 / kind.corners, space.continuum.stress_size
+    sign = shape.signs
+    Parts = space.mat(max(1, shape.partial), size)
+    packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
+    packed_numbers, packed_forces = packed(wp.array2d(dtype=real)), packed(wp.array2d(dtype=types.vector))
+
+    @forward_kernel
+    def force(
+        first: int,
+        material: law.Parameters,
+        wave_speed: real,
+        time_step: wp.array(dtype=real),
+        corners: wp.array2d(dtype=wp.int32),
+        nodes: CellNodes,
+        numbers: wp.array2d(dtype=real),
+        forces: wp.array2d(dtype=types.vector),
+        rough_loss: wp.array(dtype=wp.float64),
+    ):
+        c = first + wp.tid()
+        packed_nodes(nodes)
+        packed_table(corners)
+        packed_numbers(numbers)
+        packed_forces(forces)
+        x, dt = shape.Modes(), time_step[0]
+        mean, mean_rate = types.stress(), types.stress()
+        stress_parts, rate_parts = Parts(), Parts()
+        for k in range(wp.static(n)):
+            i = corners[c, k]
+            point = nodes.point[i]
+            rate = nodes.elastic_rate[i]
+            sigma = space.phi.stress(point.phi)
+            x += wp.outer(T[k], point.x)
+            mean += sigma
+            mean_rate += rate
+            for p in range(wp.static(shape.partial)):
+                stress_parts[p] += sign[k, p] * sigma
+                rate_parts[p] += sign[k, p] * rate
+        B, volume, frame = shape.measure(x)
+        share = real(per_corner) * volume
+        # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² a bound of the cell's own frequencies.
+        stiff = real(0.0)
+        for k in range(wp.static(n)):
+            gradient = types.vector()
+            for m in range(wp.static(d)):
+                gradient += T[k, m] * B[m]
+            stiff += wp.length_sq(gradient)
+        stiff = real(n) * wave_speed * wave_speed * stiff / (volume * volume)
+        eta = real(0.0)
+        if dt > real(0.0):
+            eta = wp.min(real(0.5) * dt, real(1.0) / (dt * stiff))
+        per_share, G = real(1.0) / numbers[c, 0], types.tensor()
+        for a in range(wp.static(d)):
+            for b in range(wp.static(d)):
+                G[a, b] = per_share * numbers[c, 1 + d * a + b]
+        whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
+        tau = eta * (whole - real(per_corner) * mean_rate)
+        S = real(per_corner) * mean + tau
+        F = shape.Modes()
+        for m in range(wp.static(shape.modes)):
+            F[m] = space.stress.traction(S, B[m])
+        power = volume * space.stress.complementary(
+            tau, whole, material.lame, material.shear, material.young
+        )  # τ : G v, since Dₑ : G v is at hand
+        if wp.static(shape.partial > 0):
+            W = Parts()
+            for p in range(wp.static(shape.partial)):
+                Y = types.tensor()
+                for a in range(wp.static(d)):
+                    for b in range(wp.static(d)):
+                        Y[a, b] = per_share * numbers[c, 1 + d * d * (1 + p) + d * a + b]
+                part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
+                rough = eta * (real(n) * part - rate_parts[p])
+                W[p] = real(CORNER_SHARE) * stress_parts[p] + rough
+                power += share * space.stress.complementary(
+                    rough, part, material.lame, material.shear, material.young
+                )
+            bent = types.tensor()
+            for q in range(wp.static(len(shape.links))):
+                pull = share * space.stress.traction(
+                    W[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]
+                )
+                F[wp.static(shape.links[q][0])] += pull
+                bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
+            bent = bent / volume
+            for m in range(wp.static(shape.modes)):
+                F[m] -= bent * B[m]
+        rough_loss[c] += wp.float64(dt * power)
+        for k in range(wp.static(n)):
+            forces[c, k] = -(T[k] * F)
+
+    return force
+
+
+@cache
+def push_kernel(space: Space, kind: CellKind, slots: bool):
+    """f of each node from its cells, a = f/m + b, v = e^{−cΔt/2} v^{n+1/2} + ½Δt a, held."""
+    real, types, (Held, hold) = space.real, space.types, held_types(space)
+    CellNodes, cell_at, place_of = cell_node_types(space)[1], cell_in_slot(kind), corner_place(kind)
+    packed_nodes, packed_forces = packed(CellNodes), packed(wp.array2d(dtype=types.vector))
+
+    @forward_kernel
+    def push(
+        first: int,
+        held: Held,
+        body_force: wp.array(dtype=types.vector),
+        damping: real,
+        time_step: wp.array(dtype=real),
+        table: NodeCells,
+        forces: wp.array2d(dtype=types.vector),
+        nodes: CellNodes,
+        faults: wp.array(dtype=wp.int32),
+    ):
+        i = first + wp.tid()
+        packed_nodes(nodes)
+        packed_forces(forces)
+        f = types.vector()
+        if wp.static(slots):
+            for k in range(wp.static(kind.corners)):
+                c = cell_at(i, k, table)
+                if c >= 0:
+                    f += forces[c, k]
+        else:  # the same, entry by entry
+            for entry in range(table.first[i], table.first[i + 1]):
+                c, k = place_of(entry, table)
+                f += forces[c, k]
+        dt, mass, v_half = time_step[0], nodes.mass[i], nodes.half[i].v
+        h = real(0.5) * dt
+        b = body_force[2]
+        a = f / mass + b
+        free = wp.exp(-damping * h) * v_half + h * a
+        v = hold(i, free, END, held)
+        book = nodes.books[i]
+        book[0] += wp.float64(dt * mass * wp.dot(b, v_half))
+        book[1] += wp.float64(mass * wp.dot(v - free, v_half))
+        nodes.books[i] = book
+        row = held.row[i]
+        if row >= 0 and h > real(0.0):
+            held.reaction[row] = (mass / h) * (v - free)
+        nodes.acceleration[i] = a
+        phi = space.phi.with_velocity(nodes.point[i].phi, v)
+        nodes.point[i].phi = phi
+        if not wp.isfinite(wp.dot(phi, phi) + wp.dot(nodes.displacement[i], nodes.displacement[i])):
+            faults[NON_FINITE] = 1
+
+    return push

@@ -1,0 +1,131 @@
+"""Cells by the modes of their corners: gradients, forces and hourglass modes of every kind by one formula.
+
+With constant weights T a cell's corner values f_k become modes f_m = Σ_k T_km f_k. Of a simplex they are the
+differences to corner 0. Of a grid's cell, with ξ_a = ±1 at the corners, they are the coefficients of
+f = f_0 + Σ_a f_a ξ_a + Σ_ab f_ab ξ_a ξ_b + …, those of two axes and more its hourglass modes. Then
+
+    A_T G_T v = Σ_m v_m ⊗ B_m,        B_m = ∂A_T/∂x_m,        f_k = −Σ_m T_km F_m,
+
+the gradient's mean over the cell, exact on any cell, and its adjoint: the power of a stress S that is constant in
+a cell is A S : G v, and F_m = S B_m. Constant stresses are in equilibrium, since Σ_T A_T is the body's volume
+(Flanagan and Belytschko 1981). An hourglass mode without its linear part, q_m = v_m − (G v) x_m, adds to the
+gradient at a corner κ Σ_a q_m ⊗ ∇ξ_a Π_{b in m, b ≠ a} ξ_b: what alternates along a alone is of mode m without a.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from ..mesh.kinds import CellKind
+from ..physics.space import Space
+
+
+@dataclass(frozen=True)
+class CellShape:
+    """The functions of one kind of cell.
+
+    Attributes:
+        modes: how many there are; the first d are linear, the others hourglass modes.
+        partial: how many of them, the first ones, are parts of another one: those that stresses have to know.
+        links: (m, a, p) for each hourglass mode m and each of its axes a: p is m without a.
+        weights: T, shape (c, modes).
+        signs: ±1 of each corner in each mode of a grid's cell, shape (c, modes).
+        Modes: Warp matrix of the modes of a vector, a row each.
+        measure: Modes of x → (B_m in row m, A_T, ∇ξ_a in row a).
+    """
+
+    modes: int
+    partial: int
+    links: tuple[tuple[int, int, int], ...]
+    weights: object
+    signs: object
+    Modes: type
+    measure: wp.Function
+
+
+@cache
+def cell_shape(space: Space, kind: CellKind) -> CellShape:
+    """The functions of a kind of cell in a space."""
+    d = space.dim
+    axes = [(a,) for a in range(d)] + (list(kind.modes) if kind.grid else [])
+    if kind.grid:
+        weights = np.array([[side[list(m)].prod() for m in axes] for side in kind.sides]) / kind.corners
+    else:
+        weights = np.array(kind.gradients)
+    links = tuple(
+        (axes.index(m), a, axes.index(tuple(b for b in m if b != a))) for m in axes if len(m) > 1 for a in m
+    )
+    modes = len(axes)
+    matrix = space.mat(kind.corners, modes)
+    return CellShape(
+        modes=modes,
+        partial=modes - 1 if links else 0,
+        links=links,
+        weights=matrix(*weights.ravel().tolist()),
+        signs=matrix(*np.sign(weights).ravel().tolist()),
+        Modes=space.mat(modes, d),
+        measure=_measure(space, kind, modes),
+    )
+
+
+@cache
+def _cofactor(space: Space) -> wp.Function:
+    """Vectors e_a in the rows of a matrix → ∂ det/∂e_a in row a."""
+    matrix, real, dim = space.types.tensor, space.real, space.dim
+
+    @wp.func
+    def cofactor(e: matrix):
+        if wp.static(dim == 1):
+            return matrix(real(1.0))
+        elif wp.static(dim == 2):
+            return matrix(e[1, 1], -e[1, 0], -e[0, 1], e[0, 0])
+        else:
+            a, b, c = wp.cross(e[1], e[2]), wp.cross(e[2], e[0]), wp.cross(e[0], e[1])
+            return matrix(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+
+    return cofactor
+
+
+@cache
+def _measure(space: Space, kind: CellKind, modes: int) -> wp.Function:
+    real, Modes, tensor, d = space.real, space.mat(modes, space.dim), space.types.tensor, space.dim
+    cofactor, size = _cofactor(space), 2.0**space.dim if kind.grid else kind.volume
+    third, warped = 1.0 / 3.0, kind.grid and d == 3
+
+    @wp.func
+    def measure(x: Modes):
+        e = tensor()
+        for a in range(wp.static(d)):
+            for k in range(wp.static(d)):
+                e[a, k] = x[a, k]
+        linear = cofactor(e)
+        det = real(0.0)
+        for k in range(wp.static(d)):
+            det += e[0, k] * linear[0, k]
+        frame = linear / det  # rows ∇ξ_a, of the cell's linear part
+        gradient = Modes()
+        if wp.static(warped):  # faces of four corners need not be plane: B of the mean over the cell
+            h01, h02, h12 = x[3], x[4], x[5]
+            m0 = linear[0] + real(third) * wp.cross(h01, h02)
+            m1 = linear[1] + real(third) * wp.cross(h12, h01)
+            m2 = linear[2] + real(third) * wp.cross(h02, h12)
+            r01 = real(third) * (wp.cross(e[1], h12) + wp.cross(h02, e[0]))
+            r02 = real(third) * (wp.cross(h12, e[2]) + wp.cross(e[0], h01))
+            r12 = real(third) * (wp.cross(e[2], h02) + wp.cross(h01, e[1]))
+            for k in range(3):
+                gradient[0, k] = m0[k]
+                gradient[1, k] = m1[k]
+                gradient[2, k] = m2[k]
+                gradient[3, k] = r01[k]
+                gradient[4, k] = r02[k]
+                gradient[5, k] = r12[k]
+        else:
+            for a in range(wp.static(d)):
+                for k in range(wp.static(d)):
+                    gradient[a, k] = linear[a, k]
+        gradient = real(size) * gradient
+        return gradient, wp.ddot(x, gradient) / real(d), frame
+
+    return measure
