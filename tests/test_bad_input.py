@@ -360,7 +360,7 @@ def test_message_stays_one_line_when_a_user_function_raises_several():
 
 @pytest.mark.parametrize("shape", [Box((4.0,) * dim, 1.0) for dim in (1, 2, 3)], ids=["1D", "2D", "3D"])
 @pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", [name for name, scheme in SCHEMES.items() if scheme.stepper is None])
 def test_support_must_reach_the_neighbours_of_a_corner_and_not_too_far(scheme, kernel, shape):
     """A corner node must see the auxiliary nodes beside its own: r² = (3/2)² + (d − 1)/4; in 1D one is enough. The
     compatible scheme's sums by parts end at √6.5 spacings."""

@@ -72,6 +72,8 @@ class Numerics:
             continuum: the continuum, for its number of dimensions.
             stretch: longest cell edge over spacing, 1 on a regular lattice.
         """
+        if self.scheme.stepper is not None:  # it takes no sums over neighbours
+            return
         support = self.smoothing.support
         least = continuum.smallest_support * stretch / support
         most = self.scheme.largest_support(continuum.dim) / support

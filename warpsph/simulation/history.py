@@ -9,7 +9,8 @@ import io
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from array import array
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +55,15 @@ class History:
         self._interval = duration / 400.0 if output.interval is None else output.interval
         self.names = ["step", "time", *(probe.name for probe in self._probes)]
         self.units = ["-", "s", *(probe.unit for probe in self._probes)]
-        self._rows: list[list[float]] = []
+        self._values = array("d")  # row after row, in few bytes: a run may have millions
         self.next_time = -math.inf  # of the simulation [s], when to sample next
         if state is not None:
-            self._restore(state)
+            self._values.extend(state["rows"].ravel())
+            self.next_time = float(state["next"])
         header = [f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)]
-        self._file = None if path is None else _Rows(path, [header, *map(_texts, self._rows)])
+        written = _encoded([header, *map(_texts, self._table().tolist())])
+        self._hash = hashlib.sha256(written)
+        self._file = None if path is None else _Rows(path, written)
         if state is None:
             self.observe(simulation)
 
@@ -74,32 +78,31 @@ class History:
 
     def sample(self, simulation: Simulation) -> None:
         """Sample now, unless this step was sampled already."""
-        if self._rows and self._rows[-1][0] == simulation.steps:
+        if self._values and self._values[-len(self.names)] == simulation.steps:
             return
         row = [simulation.steps, simulation.time, *(probe.sample(simulation) for probe in self._probes)]
-        self._rows.append(row)
+        self._values.extend(row)
+        written = _encoded([_texts(row)])
+        self._hash.update(written)
         if self._file:
-            self._file.write([_texts(row)])
+            self._file.write(written)
 
     @property
     def digest(self) -> str:
         """SHA-256 of the file as it is when every row is in it, as hexadecimal digits."""
-        header = [f"{n} [{u}]" for n, u in zip(self.names, self.units, strict=True)]
-        return hashlib.sha256(_encoded([header, *map(_texts, self._rows)])).hexdigest()
+        return self._hash.hexdigest()
 
     def state(self) -> dict[str, np.ndarray]:
         """All that is needed to go on: the rows, and when to sample next [s]."""
-        rows = np.array(self._rows, dtype=float).reshape(-1, len(self.names))
-        return {"rows": rows, "next": np.array(self.next_time)}
+        return {"rows": self._table(), "next": np.array(self.next_time)}
 
-    def _restore(self, state: Mapping[str, np.ndarray]) -> None:
-        self.next_time = float(state["next"])
-        self._rows = [[int(row[0]), *row[1:]] for row in state["rows"].tolist()]
+    def _table(self) -> np.ndarray:
+        return np.array(self._values).reshape(-1, len(self.names))
 
     def __getitem__(self, name: str) -> np.ndarray:
         """All samples of one column."""
-        column = self.names.index(name)
-        return np.array([row[column] for row in self._rows])
+        values = self._table()[:, self.names.index(name)].copy()
+        return values.astype(int) if name == "step" else values
 
     def unit(self, name: str) -> str:
         """Unit of a column."""
@@ -112,7 +115,7 @@ class History:
 
 
 def _texts(row: list[float]) -> list:
-    return [row[0], *(repr(float(value)) for value in row[1:])]
+    return [int(row[0]), *(repr(float(value)) for value in row[1:])]
 
 
 def _encoded(rows: Iterable[list]) -> bytes:
@@ -127,15 +130,15 @@ class _Rows:
     It takes the place of a former one when its first rows are in it.
     """
 
-    def __init__(self, path: Path, rows: Sequence[list]):
-        self._path, self._waiting, self._end, self._failed = path, _encoded(rows), 0, False
+    def __init__(self, path: Path, rows: bytes):
+        self._path, self._waiting, self._end, self._failed = path, rows, 0, False
         with whole(path) as temporary:
             self._file = temporary.open("wb", buffering=0)
             self._flush()
 
-    def write(self, rows: Iterable[list]) -> None:
-        """Add rows; those that the disk does not take are kept for the next time."""
-        self._waiting += _encoded(rows)
+    def write(self, rows: bytes) -> None:
+        """Add whole rows; those that the disk does not take are kept for the next time."""
+        self._waiting += rows
         self._flush()
 
     def _flush(self) -> None:
