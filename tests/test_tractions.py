@@ -154,7 +154,7 @@ def test_a_load_between_a_roller_and_a_free_edge_is_in_equilibrium(device, preci
 
 
 class Resolved:
-    """Conditions of a body, the plate unless told, asked node by node for the stress that they leave of another."""
+    """Conditions of the plate, or of another body, asked node by node for the stress that they leave."""
 
     def __init__(self, *conditions, stiffness=None, shape=PLATE):
         self.mesh = shape.mesh()
