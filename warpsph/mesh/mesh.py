@@ -102,11 +102,9 @@ class Mesh:
         if self.dim == 3 and self.kind.grid:
             jacobians = self.cell_jacobians()
             twists = dict(zip(self.kind.modes, self._twists(), strict=True))
-            for axis in range(3):
-                columns = jacobians.copy()
-                for other in {0, 1, 2} - {axis}:
-                    columns[:, :, other] = twists[min(axis, other), max(axis, other)]
-                volume += np.linalg.det(columns) / 12.0
+            for k in range(3):
+                columns = [jacobians[:, :, a] if a == k else twists[min(a, k), max(a, k)] for a in range(3)]
+                volume += np.sum(columns[0] * np.cross(*columns[1:]), axis=1) / 12.0
         return volume
 
     def middle_volumes(self) -> np.ndarray:
@@ -175,8 +173,9 @@ class Mesh:
 
     def largest_edge(self) -> float:
         """Length of the longest cell edge [m]."""
-        corners = self.nodes[self.cells]
-        return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
+        corners = self.nodes.T[:, self.cells.T]
+        squares = [np.sum((corners[:, b] - corners[:, a]) ** 2, axis=0).max() for a, b in self.kind.edges]
+        return float(np.sqrt(max(squares)))
 
     @cached_property
     def cell_stretches(self) -> np.ndarray:

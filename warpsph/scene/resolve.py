@@ -177,9 +177,11 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
     touching: dict[int, list[int]] = defaultdict(list)  # places in the table of faces
     for place, node in enumerate(mesh.faces.ravel().tolist()):
         touching[node].append(place)
-    corners, angles = mesh.faces.shape[1], mesh.face_angles().round(9).ravel()
-    normals_at = np.repeat(mesh.face_normals(), corners, axis=0)
-    alike = np.unique(np.column_stack([normals_at, angles]), axis=0, return_inverse=True)[1].ravel().tolist()
+    corners, angles, face_normals = mesh.faces.shape[1], mesh.face_angles().round(9).ravel(), mesh.face_normals()
+    normals_at = np.repeat(face_normals, corners, axis=0)
+    alike = np.repeat(np.unique(face_normals, axis=0, return_inverse=True)[1].ravel(), corners)
+    distinct, angle = np.unique(angles, return_inverse=True)
+    alike = (alike * len(distinct) + angle).tolist()  # equal where both normal and angle are
     unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
     for condition in conditions:
         if isinstance(condition, Free) and condition.normal is None:
