@@ -233,6 +233,9 @@ def half_cells_that_hold_together():
 FLAT = "is not allowed: it is flat or folded: a"
 NOT_A_BODY = {
     "no points": (3, [(0, 1, 2)], "points = 3 is not allowed: it must be numbers [m] of shape (n, 1), (n, 2)"),
+    "texts": ([("0", "0")], [(0, 0, 0)], "points = [('0', '0')] is not allowed: it must be numbers [m] of shape"),
+    "complex": ([(1j, 0.0)], [(0, 0, 0)], "points = [(1j, 0.0)] is not allowed: it must be numbers"),
+    "uneven": ([(0.0, 0.0), (1.0,)], [(0, 1)], "points = [(0.0, 0.0), (1.0,)] is not allowed: it must be numbers"),
     "four axes": ([(0, 0, 0, 0)], [(0,)], "points = [(0, 0, 0, 0)] is not allowed: it must be numbers"),
     "infinite": (
         [(0.0, 0.0), (np.inf, 0.0)],
