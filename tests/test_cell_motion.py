@@ -72,7 +72,7 @@ def test_densities_are_exact_in_a_homogeneous_motion(device, precision, dim, nam
     np.testing.assert_allclose(simulation.field("density"), SOFT.density / ratio, rtol=tolerance)
     np.testing.assert_allclose(simulation.auxiliary.density.numpy(), SOFT.density / ratio, rtol=tolerance)
     volume = simulation.auxiliary.volume.numpy()
-    np.testing.assert_allclose(volume, simulation.mesh.cell_volumes() * ratio, rtol=tolerance)
+    np.testing.assert_allclose(volume, simulation.mesh.middle_volumes() * ratio, rtol=tolerance)
     held = simulation.nodes.volume.numpy() * simulation.field("density")
     np.testing.assert_allclose(held, weight, rtol=tolerance)
     np.testing.assert_array_equal(simulation.field("mass"), mass)
@@ -195,7 +195,7 @@ def test_spacing_is_the_least_singular_value_of_the_edges_times_the_root_of_the_
     shrinkage_after(simulation, MOTIONS[name](dim))
     spacing = 1.0 / simulation.stepper.lists.motion._spacing._rate.numpy()
     edges = edges_of(simulation)
-    density = SOFT.density * simulation.mesh.cell_volumes() / np.abs(np.linalg.det(edges))
+    density = SOFT.density * simulation.mesh.middle_volumes() / np.abs(np.linalg.det(edges))
     error = spacing / (np.linalg.svd(edges, compute_uv=False).min(axis=1) * np.sqrt(density)) - 1.0
     assert error.min() >= -100 * ROUNDING[precision]
     assert error.max() <= 0.003

@@ -98,6 +98,121 @@ def test_cells_of_nodes_are_the_table_of_cells_turned_round(dim):
         assert len(own) == (mesh.cells == i).sum() and (np.diff(own % corners) >= 0).all()
 
 
+def shaken(kind, seed=0):
+    """A mesh of that kind whose nodes are moved by up to a fifth of the spacing, so that hexahedra are warped."""
+    size = (1.0, 0.5, 0.75)[: kind.dim]
+    box = Box(size, 0.25) if kind.grid else Box(size, 0.25, cells=f"{kind.name}s".replace("drons", "dra"))
+    mesh = box.mesh()
+    return mesh.with_nodes(mesh.nodes + np.random.default_rng(seed).uniform(-0.05, 0.05, mesh.nodes.shape))
+
+
+@every_kind
+def test_slopes_are_those_of_the_shape_functions(kind):
+    """N_k is 1 at its corner and 0 at the others; along each axis it is linear, so that differences are exact."""
+    place, step = np.linspace(0.2, 0.4, kind.dim), 0.1 * np.eye(kind.dim)
+    points = np.array(kind.points)
+
+    def shape(ξ):
+        if not kind.grid:
+            return np.array([1.0 - ξ.sum(), *ξ])
+        return np.where(points == 1.0, ξ, 1.0 - ξ).prod(axis=1)
+
+    expected = np.stack([(shape(place + e) - shape(place - e)) / 0.2 for e in step], axis=1)
+    assert np.allclose(kind.slopes(place), expected, atol=1e-14)
+    middle = points.mean(axis=0)
+    assert np.allclose(kind.slopes(middle), kind.gradients, atol=1e-15)
+
+
+@every_kind
+def test_volumes_are_those_that_faces_enclose(kind):
+    """Gauss on the cell's own faces; a bilinear face lets through the mean of what its two cuts do."""
+    mesh = shaken(kind)
+    x = mesh.nodes[mesh.cells]
+    x = x - x.mean(axis=1, keepdims=True)
+    if kind.dim == 1:
+        enclosed = x[:, 1, 0] - x[:, 0, 0]
+    elif kind.dim == 2:
+        a, b = x[:, list(kind.drawn)], np.roll(x[:, list(kind.drawn)], -1, axis=1)
+        enclosed = 0.5 * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=1)
+    else:
+        enclosed = 0.0
+        for face in kind.faces:
+            ring = [face[k] for k in kind.face_kind.drawn]
+            cuts = (
+                [ring] if len(ring) == 3 else [ring[k:] + ring[:k] for k in range(4)]
+            )  # all four corners cut off
+            flux = sum(np.linalg.det(x[:, cut[:3]]) / 6.0 for cut in cuts) / (1 if len(ring) == 3 else 2)
+            out = np.sign(np.linalg.det(np.array(kind.points)[ring[:3]] - np.mean(kind.points, axis=0)))
+            enclosed = enclosed + out * flux
+    assert np.allclose(mesh.cell_volumes(), enclosed, rtol=1e-12)
+
+
+@every_kind
+def test_gradients_of_corners_are_how_volumes_follow_them(kind):
+    """A volume is linear in each coordinate of each corner, so that differences are exact."""
+    mesh = shaken(kind)
+    found = mesh.corner_gradients() * mesh.cell_volumes()[:, None, None]
+    cell, step = len(mesh.cells) // 2, 0.03
+    for corner, axis in itertools.product(range(kind.corners), range(kind.dim)):
+        volumes = []
+        for side in (step, -step):
+            nodes = mesh.nodes.copy()
+            nodes[mesh.cells[cell, corner], axis] += side
+            volumes.append(mesh.with_nodes(nodes).cell_volumes()[cell])
+        slope = (volumes[0] - volumes[1]) / (2.0 * step)
+        assert found[cell, corner, axis] == pytest.approx(slope, abs=1e-12 * 0.25 ** (kind.dim - 1))
+
+
+@every_kind
+def test_gradients_of_corners_are_exact_for_linear_fields_and_hold_each_other(kind):
+    mesh = shaken(kind)
+    gradients = mesh.corner_gradients()
+    assert np.allclose(gradients.sum(axis=1), 0.0, atol=1e-11)
+    ones = np.einsum("mci,mcj->mij", mesh.nodes[mesh.cells], gradients)
+    assert np.allclose(ones, np.eye(kind.dim), atol=1e-11)
+
+
+def test_volumes_by_the_middle_differ_in_warped_hexahedra_only():
+    for kind in KINDS.values():
+        mesh = shaken(kind)
+        equal = np.allclose(mesh.middle_volumes(), mesh.cell_volumes(), rtol=1e-12)
+        assert equal == (kind is not HEXAHEDRON), kind.name
+    block = Box((1.0, 0.5, 0.75), 0.25).mapped(lambda x, y, z: (2.0 * x + z, y - 0.3 * x, z)).mesh()
+    assert np.allclose(block.middle_volumes(), block.cell_volumes(), rtol=1e-12)
+
+
+@every_kind
+def test_stretches_do_not_depend_on_which_corner_is_the_first(kind):
+    """A regular cell has its edge in all directions; cells counted from another corner have the same lengths."""
+    regular = np.array(kind.points) @ kind.regular.T
+    lengths = [np.linalg.norm(regular[b] - regular[a]) for a, b in kind.edges]
+    assert np.allclose(lengths, 1.0)
+    mesh = shaken(kind)
+    turns = [kind.mirrored] if kind.grid else list(itertools.permutations(range(kind.corners)))
+    for turn in turns:
+        other = Mesh(**(vars(shaken(kind)) | {"cells": mesh.cells[:, turn]}))
+        assert np.allclose(other.cell_stretches, mesh.cell_stretches, rtol=1e-10)
+
+
+def test_least_distance_of_right_triangles():
+    """Legs 1: the map from a regular triangle has singular values √2 and √(2/3); from cell to cell the same."""
+    for diagonals in ("rising", "falling", "alternating"):
+        mesh = Box((3.0, 2.0), 1.0, cells="triangles", diagonals=diagonals).mesh()
+        assert np.allclose(mesh.cell_stretches, [2.0**0.5, (2.0 / 3.0) ** 0.5])
+        assert mesh.smallest_distance() == pytest.approx((2.0 / 3.0) ** 0.5)
+
+
+@pytest.mark.parametrize("kind", [TRIANGLE, QUAD], ids=lambda kind: kind.name)
+def test_angles_of_faces_around_a_node_of_a_flat_surface_are_a_full_turn(kind):
+    box = Box((1.0, 1.0, 1.0), 0.25, cells="lattice" if kind is QUAD else "tetrahedra").mesh()
+    top = box.face_side == 5
+    angles = np.bincount(box.faces[top].ravel(), box.face_angles()[top].ravel(), len(box.nodes))
+    x, y, z = box.nodes.T
+    inner = (z == 1.0) & (x > 0.1) & (x < 0.9) & (y > 0.1) & (y < 0.9)
+    assert np.allclose(angles[inner], 2.0 * np.pi)
+    assert np.allclose(box.face_angles().sum(axis=1), np.pi * (kind.corners - 2))
+
+
 class Triangles(Shape):
     """The unit square as two triangles."""
 

@@ -11,13 +11,16 @@ from warpsph import (
     Elastic,
     Fixed,
     Free,
+    GivenMesh,
     Numerics,
+    Polygon,
     PrescribedVelocity,
     Roller,
     Scene,
     SceneError,
     Simulation,
     edge,
+    tag,
     where,
 )
 from warpsph.scene.fingerprint import fingerprint
@@ -151,10 +154,10 @@ def test_a_load_between_a_roller_and_a_free_edge_is_in_equilibrium(device, preci
 
 
 class Resolved:
-    """Conditions of the plate, asked node by node for the stress that they leave of another."""
+    """Conditions of the plate, or of another body, asked node by node for the stress that they leave."""
 
-    def __init__(self, *conditions, stiffness=None):
-        self.mesh = PLATE.mesh()
+    def __init__(self, *conditions, stiffness=None, shape=PLATE):
+        self.mesh = shape.mesh()
         self.table = resolve(self.mesh, conditions, stiffness)
 
     def stress(self, *point, given=(0.0, 0.0, 0.0, 0.0)):
@@ -193,6 +196,21 @@ def test_where_a_load_ends_its_last_node_has_the_mean(traction):
         assert plate.stress(x, 0.5) == [0.0, pressure, 0.0, 0.0]
     sheared = Resolved(traction(edge("right"), traction=(2.0, 4.0)), Free(edge("top")))
     assert sheared.stress(1.0, 0.5) == [2.0, 0.0, 2.0, 0.0]
+
+
+def test_corners_that_look_alike_have_the_loads_of_their_own_faces(traction):
+    """A step with two corners: the upper one is loaded on both of its faces, the lower one on top only."""
+    step = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], 1.0).mesh()
+    number = {tuple(point): k for k, point in enumerate(step.nodes.tolist())}
+    upper, lower, inner = number[1.0, 2.0], number[2.0, 1.0], number[1.0, 1.0]
+    tags = {
+        "loaded": [(number[0.0, 2.0], upper), (inner, upper), (inner, lower)],
+        "free": [(lower, number[2.0, 0.0])],
+    }
+    body = GivenMesh(points=step.nodes, cells=step.cells[:, list(step.kind.drawn)], tags=tags)
+    resolved = Resolved(traction(tag("loaded"), traction=(2.0, 0.0)), Free(tag("free")), shape=body)
+    assert resolved.stress(1.0, 2.0) == [2.0, 0.0, 1.0, 0.0]
+    assert resolved.stress(2.0, 1.0) == [0.0, 0.0, 1.0, 0.0]
 
 
 def test_edges_turn_and_loads_keep_their_directions(device, traction):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import SceneError
 from ..mesh.mesh import Mesh
 
 
@@ -14,7 +15,12 @@ def checkerboard(mesh: Mesh, values: np.ndarray) -> np.ndarray:
     hourglass component Σ s_k f_k/2ᵈ (s_k = ±1 alternating), and the part at a node is the mean of s h over
     its 2ᵈ cells, which in the plane is the stencil [1 −2 1] ⊗ [1 −2 1]/16. A plain projection onto (−1)^{i+j}
     would see a smooth field as well, by its edges. (Bars and plane strain alike; d = 1, 2 or 3.)
+
+    Raises:
+        SceneError: the mesh is of triangles or tetrahedra, which have no such mode.
     """
+    if not mesh.kind.grid:
+        raise SceneError("cells", mesh.kind.name, "segments, quads and hexahedra alone have a checkerboard")
     corners, sign = mesh.kind.corners, mesh.kind.sides.prod(axis=1)
     hourglass = values[mesh.cells] @ sign / corners
     part, cells = np.zeros(len(values)), np.zeros(len(values), dtype=int)

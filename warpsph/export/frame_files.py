@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mesh.continuum import CONTINUA
 from ..mesh.kinds import KINDS
-from ..mesh.mesh import ARRAYS, Mesh
+from ..mesh.mesh import ARRAYS, NO_SIDE, Mesh
 from ..simulation.fields import FIELDS
 from ..storage.files import remove_parts, whole
 from ..storage.owner import marked
@@ -103,7 +103,8 @@ def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
         check_indices(
             "face_cell", check_array("f", parts["face_cell"], kind="iu", shape=(len(faces),)), len(cells)
         )
-        check_indices("face_side", check_array("f", parts["face_side"], kind="iu", shape=(len(faces),)), 6)
+        sides = check_array("face_side", parts["face_side"], kind="i", shape=(len(faces),))
+        check_indices("face_side", sides - NO_SIDE, 2 * kind.dim - NO_SIDE)
         require(len(cells) > 0, "it has no cells")
         held = [check_indices(f"wall_{k}", arrays[f"wall_{k}"], len(faces)) for k in range(walls)]
         require(all(wall.ndim == 1 and wall.size for wall in held), "a wall has no faces")

@@ -118,7 +118,8 @@ class Drawing:
         self._cells.describe(len(mesh.cells))
         UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         for built, prim in self._walls:
-            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(built.polygons), 4, dtype=np.int32)))
+            sizes = np.full(len(built.polygons), built.polygons.shape[1], dtype=np.int32)
+            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(sizes))
             prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(built.polygons.astype(np.int32).ravel()))
             prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
             prim.CreateDoubleSidedAttr(True)

@@ -59,11 +59,11 @@ def _unused(name: str, taken: Sequence[str]) -> str:
 class WallMesh:
     """A wall as a mesh whose topology stays and whose points follow the wall's nodes.
 
-    It stands one node's radius outside the nodes, so that nodes drawn as spheres touch it: a quad a face in 3D,
+    It stands one node's radius outside the nodes, so that nodes drawn as spheres touch it: the face itself in 3D,
     a box a face in plane strain, as deep as it is thick, and a square plate at the end of a bar.
 
     Attributes:
-        polygons: indices into the points, shape (polygons, 4).
+        polygons: indices into the points, shape (polygons, 3 or 4).
     """
 
     mesh: Mesh

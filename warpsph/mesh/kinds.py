@@ -88,6 +88,15 @@ class CellKind:
         return self.sides * np.stack(others, axis=1)
 
     @cached_property
+    def rule(self) -> tuple[tuple[float, np.ndarray], ...]:
+        """Weights and ∂N_k/∂ξ_a, shape (c, d), at points (Gauss) that integrate volumes exactly."""
+        if not self.grid:
+            return ((self.volume, np.array(self.gradients)),)
+        line = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
+        places = tuple(itertools.product(line, repeat=self.dim))
+        return tuple((1.0 / len(places), self.slopes(place)) for place in places)
+
+    @cached_property
     def mirrored(self) -> Corners:
         """The corners of the same cell counted the other way round, which turns the sign of its Jacobian."""
         if not self.grid:

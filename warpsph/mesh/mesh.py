@@ -93,8 +93,44 @@ class Mesh:
         return replace(self, nodes=nodes)
 
     def cell_volumes(self) -> np.ndarray:
-        """Volume of each cell [mᵈ], shape (m,), by the Jacobian in its middle (exact for quads and simplices)."""
+        """Volume of each cell [mᵈ], shape (m,), exact: of a hexahedron that between its bilinear faces.
+
+        By the Jacobian in the middle; a hexahedron's has the twists h_ab = ∂²x/∂ξ_a∂ξ_b as well, which add
+        [det(J₁, h₁₂, h₁₃) + det(h₁₂, J₂, h₂₃) + det(h₁₃, h₂₃, J₃)]/12.
+        """
+        volume = self.middle_volumes()
+        if self.dim == 3 and self.kind.grid:
+            jacobians = self.cell_jacobians()
+            twists = dict(zip(self.kind.modes, self._twists(), strict=True))
+            for k in range(3):
+                columns = [jacobians[:, :, a] if a == k else twists[min(a, k), max(a, k)] for a in range(3)]
+                volume += np.sum(columns[0] * np.cross(*columns[1:]), axis=1) / 12.0
+        return volume
+
+    def middle_volumes(self) -> np.ndarray:
+        """Volume of each cell [mᵈ] if its Jacobian were everywhere that of its middle, shape (m,).
+
+        It follows a uniform deformation exactly. Only hexahedra with warped faces have another volume.
+        """
         return self.kind.volume * np.linalg.det(self.cell_jacobians())
+
+    def _twists(self) -> list[np.ndarray]:
+        """How the corners of a hexahedron follow its first modes, ∂²x/∂ξ_a∂ξ_b in the middle [m], (m, 3) each."""
+        corners = [self.nodes[corner] for corner in self.cells.T]
+        return [sum(0.5 * s * x for s, x in zip(sign, corners, strict=True)) for sign in self.kind.signs.T]
+
+    def corner_gradients(self) -> np.ndarray:
+        """Mean of ∇N_j over each cell [1/m], shape (m, c, d).
+
+        Times the cell's volume it is ∂V/∂x_j, how its volume follows each corner (Flanagan and Belytschko 1981),
+        exactly for cells of any shape; Σ_j ∇N_j = 0 and Σ_j x_j ∇N_j = 1.
+        """
+        volume, total = 0.0, 0.0
+        for weight, slopes in self.kind.rule:
+            jacobians = self.cell_jacobians(slopes)
+            part = weight * np.linalg.det(jacobians)
+            volume, total = volume + part, total + part[:, None, None] * (slopes @ np.linalg.inv(jacobians))
+        return total / volume[:, None, None]
 
     def cell_jacobians(self, slopes: np.ndarray | None = None) -> np.ndarray:
         """∂x/∂ξ at one place of each cell [m], the axes as columns, shape (m, d, d).
@@ -137,8 +173,9 @@ class Mesh:
 
     def largest_edge(self) -> float:
         """Length of the longest cell edge [m]."""
-        corners = self.nodes[self.cells]
-        return float(max(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).max() for a, b in self.kind.edges))
+        corners = self.nodes.T[:, self.cells.T]
+        squares = [np.sum((corners[:, b] - corners[:, a]) ** 2, axis=0).max() for a, b in self.kind.edges]
+        return float(np.sqrt(max(squares)))
 
     @cached_property
     def cell_stretches(self) -> np.ndarray:
@@ -163,14 +200,15 @@ class Mesh:
         """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.
 
         Mass: an equal share of each adjacent cell, so that masses add up to the body's. Weight: the mean
-        volume of the adjacent cells, so that edge and corner nodes weigh as much as interior ones; half and
-        quarter weights make free vibrations blow up (METHOD section 2).
+        of the adjacent cells' `middle_volumes`, so that edge and corner nodes weigh as much as interior ones; half
+        and quarter weights make free vibrations blow up (METHOD section 2).
         """
-        corners, owner = self.kind.corners, self.cells.ravel()
-        volume = np.repeat(self.cell_volumes()[:, None], corners, axis=1).ravel()
-        total = np.bincount(owner, weights=volume, minlength=len(self.nodes))
-        count = np.bincount(owner, minlength=len(self.nodes))
-        return total / corners, total / count
+        owner, n = self.cells.ravel(), len(self.nodes)
+        mass, weight = (
+            np.bincount(owner, np.repeat(volumes, self.kind.corners), n)
+            for volumes in (self.cell_volumes(), self.middle_volumes())
+        )
+        return mass / self.kind.corners, weight / np.bincount(owner, minlength=n)
 
     def face_normals(self) -> np.ndarray:
         """Outward unit normal of each boundary face, shape (f, d)."""
@@ -194,6 +232,21 @@ class Mesh:
         if self.dim == 2:
             return np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         return 0.5 * np.linalg.norm(self._twice_face_areas(points), axis=1)
+
+    def face_angles(self) -> np.ndarray:
+        """Angle of each boundary face at each of its corners [rad], shape (f, …); 1 where faces are no polygons.
+
+        Weights with which the normals of faces make that of a node, however a surface is cut into faces.
+        """
+        if self.dim < 3:
+            return np.ones(self.faces.shape)
+        ring = self.kind.face_kind.drawn
+        around = self.nodes[self.faces[:, ring]]
+        before, after = (np.roll(around, step, axis=1) - around for step in (1, -1))
+        sizes = np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
+        angles = np.empty(self.faces.shape)
+        angles[:, ring] = np.arccos(np.clip(np.sum(before * after, axis=2) / sizes, -1.0, 1.0))
+        return angles
 
     def _twice_face_areas(self, points: np.ndarray) -> np.ndarray:
         """Vectors along the normals of a solid's faces, twice as long as their areas, shape (f, 3)."""

@@ -19,16 +19,11 @@ MOST_PAIRS = 10**7  # of neighbouring faces that are held at once
 
 def overlap(mesh: Mesh) -> np.ndarray | None:
     """A place [m] where the boundary meets itself, shape (d,), or None."""
-    points = mesh.nodes[mesh.faces]
-    centres = points.mean(axis=1)
-    reach = np.linalg.norm(points - centres[:, None], axis=2).max()
     if mesh.dim == 1:
         return None
+    points = mesh.nodes[mesh.faces]
     meet, slack = _segments_meet if mesh.dim == 2 else _faces_meet, TOUCHING * mesh.spacing
-    low, high = points.min(axis=1) - slack, points.max(axis=1)
-    for first, second in _near(centres, 2.0 * reach):
-        chosen = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
-        first, second = first[chosen], second[chosen]
+    for first, second in _neighbours(points, slack):
         apart = (mesh.faces[first][:, :, None] != mesh.faces[second][:, None, :]).all(axis=(1, 2))
         first, second = first[apart], second[apart]
         if mesh.dim == 3:
@@ -36,8 +31,51 @@ def overlap(mesh: Mesh) -> np.ndarray | None:
         found = _coincide(points[first], points[second], slack)
         found |= meet(mesh, points[first], points[second])
         if found.any():
-            return centres[first[found.argmax()]]
+            return points[first[found.argmax()]].mean(axis=0)
     return None
+
+
+def hanging(mesh: Mesh) -> tuple[int, np.ndarray] | None:
+    """A boundary node that lies on a boundary face without being a corner of it, and that face, (k,), or None."""
+    if mesh.dim == 1:
+        return None
+    points, slack = mesh.nodes[mesh.faces], TOUCHING * mesh.spacing
+    for pair in _neighbours(points, slack):
+        for first, second in (pair, pair[::-1]):
+            for corner in mesh.faces[first].T:
+                strange = (mesh.faces[second] != corner[:, None]).all(axis=1)
+                node, face = corner[strange], second[strange]
+                on = _on_face(mesh, mesh.nodes[node], points[face], slack)
+                if on.any():
+                    return int(node[on.argmax()]), mesh.faces[face[on.argmax()]]
+    return None
+
+
+def _neighbours(points: np.ndarray, slack: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pairs of faces (f, k, d) whose boxes along the axes meet, to within `slack` [m], each pair once."""
+    centres = points.mean(axis=1)
+    reach = np.linalg.norm(points - centres[:, None], axis=2).max()
+    low, high = points.min(axis=1) - slack, points.max(axis=1)
+    for first, second in _near(centres, 2.0 * reach):
+        chosen = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        yield first[chosen], second[chosen]
+
+
+def _on_face(mesh: Mesh, place: np.ndarray, face: np.ndarray, slack: float) -> np.ndarray:
+    """Whether places (p, d) are nearer than `slack` [m] to faces (p, k, d), in triangles about their middle."""
+    if mesh.dim == 2:
+        way = face[:, 1] - face[:, 0]
+        along = np.clip(np.sum((place - face[:, 0]) * way, axis=1) / np.sum(way * way, axis=1), 0.0, 1.0)
+        return np.linalg.norm(place - face[:, 0] - along[:, None] * way, axis=1) <= slack
+    middle, found = face.mean(axis=1), np.zeros(len(place), dtype=bool)
+    for i, j in mesh.kind.face_kind.edges:
+        u, v, w = face[:, i] - middle, face[:, j] - middle, place - middle
+        normal = np.cross(u, v)
+        size = np.sum(normal * normal, axis=1)
+        x, y = np.sum(np.cross(w, v) * normal, axis=1) / size, np.sum(np.cross(u, w) * normal, axis=1) / size
+        off = np.abs(np.sum(w * normal, axis=1)) / np.sqrt(size)
+        found |= (off <= slack) & (np.minimum(np.minimum(x, y), 1.0 - x - y) >= -TOUCHING)
+    return found
 
 
 def _near(points: np.ndarray, distance: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -17,7 +17,7 @@ from .components import components
 from .faces import match_faces, row_keys
 from .kinds import CellKind
 from .mesh import Mesh
-from .overlap import TOUCHING, overlap
+from .overlap import TOUCHING, hanging, overlap
 
 FLAT = 1e-9  # a cell is flat whose Jacobian at a corner, over its longest edge to the d, is less
 ASLANT = (1.0, 2.0**0.5, 3.0**0.5)  # a direction in which the nodes of a lattice have places of their own
@@ -86,6 +86,11 @@ def check_faces(mesh: Mesh) -> None:
         raise _wrong_cell(given, last, allowed)
     owner, face = np.divmod(match.shared, len(kind.faces))
     _check_sides(mesh, owner, face, given)
+    stray = hanging(mesh)
+    if stray is not None:
+        node, corners = stray
+        allowed = f"it must not lie on a face whose corner it is not, of points {_listed(corners.tolist())}"
+        raise SceneError(f"points[{node}]", tuple(mesh.nodes[node].tolist()), allowed)
     first_of_part = components(len(cells), *owner.T)
     _refuse(given, first_of_part != 0, "no faces join it to cells[0]; a body is in one piece")
     if kind.dim > 1:
@@ -135,8 +140,8 @@ def _check_joints(mesh: Mesh, owner: np.ndarray, face: np.ndarray, joints: Seque
     apart = np.flatnonzero(root != root[first[back]])
     if len(apart):
         joint = nodes.reshape(-1, nodes.shape[2])[apart[0]].tolist()
-        places = [tuple(mesh.nodes[node].tolist()) for node in joint]
-        allowed = "cells meet there that no face which holds it links; a body has no hinges"
+        places = mesh.nodes[joint if len(joint) > 1 else joint[0]].tolist()
+        allowed = "cells meet in it that no face there joins; a body has no hinges"
         raise SceneError(f"points[{_listed(joint)}]", places, allowed)
 
 

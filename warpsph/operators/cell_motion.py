@@ -34,7 +34,7 @@ class CellMotion(Motion):
     def __init__(self, body: Body, *, skin: float, outdated: wp.array, faults: wp.array):
         super().__init__(body, skin=skin, outdated=outdated, faults=faults)
         space, device = body.space, body.launcher.device
-        volume = body.scene.mesh.cell_volumes().astype(space.precision.dtype)
+        volume = body.scene.mesh.middle_volumes().astype(space.precision.dtype)
         mass = space.precision.dtype(body.scene.material.density) * volume
         self._initial_volume, self._mass = (
             wp.array(values, dtype=space.real, device=device) for values in (volume, mass)

@@ -77,15 +77,15 @@ class GivenMesh(Shape):
 def _points(given: object) -> np.ndarray:
     """Points as the shape keeps them: a copy, float64."""
     try:
-        points = np.array(given, dtype=float)
-    except (TypeError, ValueError):
+        points = np.array(given)
+    except ValueError:  # rows of different lengths
         points = np.empty(0)
-    if points.ndim != 2 or points.shape[1] not in (1, 2, 3):
+    if points.dtype.kind not in "iuf" or points.ndim != 2 or points.shape[1] not in (1, 2, 3):
         raise SceneError("points", given, "it must be numbers [m] of shape (n, 1), (n, 2) or (n, 3)")
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():
         raise SceneError(f"points[{wrong.argmax()}]", tuple(points[wrong.argmax()].tolist()), "it must be finite")
-    return points
+    return points.astype(float)
 
 
 def _cells(given: object) -> np.ndarray:

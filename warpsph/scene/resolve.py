@@ -174,12 +174,14 @@ Signature = tuple[tuple[int, tuple[tuple[float, ...], ...]], ...]
 
 def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list[int]]:
     """Constrained nodes grouped by which conditions hold there and with which normals."""
-    touching: dict[int, list[int]] = defaultdict(list)
-    for face, corners in enumerate(mesh.faces.tolist()):
-        for node in corners:
-            touching[node].append(face)
-    face_normals = mesh.face_normals()
-    alike = np.unique(face_normals, axis=0, return_inverse=True)[1].ravel().tolist()
+    touching: dict[int, list[int]] = defaultdict(list)  # places in the table of faces
+    for place, node in enumerate(mesh.faces.ravel().tolist()):
+        touching[node].append(place)
+    corners, angles, face_normals = mesh.faces.shape[1], mesh.face_angles().round(9).ravel(), mesh.face_normals()
+    normals_at = np.repeat(face_normals, corners, axis=0)
+    alike = np.repeat(np.unique(face_normals, axis=0, return_inverse=True)[1].ravel(), corners)
+    distinct, angle = np.unique(angles, return_inverse=True)
+    alike = (alike * len(distinct) + angle).tolist()  # equal where both normal and angle are
     unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
     for condition in conditions:
         if isinstance(condition, Free) and condition.normal is None:
@@ -194,13 +196,14 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
         selected.append(nodes)
         covered.append(faces & nodes[mesh.faces].all(axis=1))
         given = getattr(condition, "normal", None)
-        edge, own = (unmoved if isinstance(condition, Free) else faces).tolist(), faces.tolist()
+        own = np.repeat(faces, corners)
+        edge = np.repeat(unmoved, corners).tolist() if isinstance(condition, Free) else own.tolist()
         known: dict[tuple, tuple] = {}  # most nodes have faces around them like those of some other node
         for node in np.flatnonzero(condition.nodes(mesh)).tolist():
-            around = [face for face in touching.get(node, ()) if edge[face]]
-            key = tuple((alike[face], own[face]) for face in around)
+            around = [place for place in touching.get(node, ()) if edge[place]]
+            key = tuple((alike[place], bool(own[place])) for place in around)
             if given is None and key not in known:
-                known[key] = _smooth_normals(face_normals[around], faces[around])
+                known[key] = _smooth_normals(normals_at[around], angles[around], own[around])
             normals = known[key] if given is None else (given,)
             if not normals and condition.takes_normal:
                 raise SceneError(
@@ -217,8 +220,8 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
     return groups
 
 
-def _smooth_normals(normals: np.ndarray, own: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged.
+def _smooth_normals(normals: np.ndarray, angles: np.ndarray, own: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """The distinct edges a node lies on: normals within `SMOOTH_EDGE_ANGLE` are averaged, weighed by angles.
 
     Only edges with a face of the condition's own count.
     """
@@ -230,7 +233,7 @@ def _smooth_normals(normals: np.ndarray, own: np.ndarray) -> tuple[tuple[float, 
                 break
         else:
             clusters.append([face])
-    means = [np.mean(normals[cluster], axis=0) for cluster in clusters if own[cluster].any()]
+    means = [angles[cluster] @ normals[cluster] for cluster in clusters if own[cluster].any()]
     return tuple(tuple(np.round(mean / np.linalg.norm(mean), 12).tolist()) for mean in means)
 
 
