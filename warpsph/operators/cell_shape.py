@@ -34,6 +34,7 @@ class CellShape:
         signs: ±1 of each corner in each mode of a grid's cell, shape (c, modes).
         Modes: Warp matrix of the modes of a vector, a row each.
         measure: Modes of x → (B_m in row m, A_T, ∇ξ_a in row a).
+        spread: B → A_T² Σ_j ∇N_j ⊗ ∇N_j, of the linear modes.
     """
 
     modes: int
@@ -43,13 +44,14 @@ class CellShape:
     signs: object
     Modes: type
     measure: wp.Function
+    spread: wp.Function
 
 
 @cache
 def cell_shape(space: Space, kind: CellKind) -> CellShape:
     """The functions of a kind of cell in a space."""
     d = space.dim
-    axes = [(a,) for a in range(d)] + (list(kind.modes) if kind.grid else [])
+    axes = (*((a,) for a in range(d)), *kind.modes)
     if kind.grid:
         weights = np.array([[side[list(m)].prod() for m in axes] for side in kind.sides]) / kind.corners
     else:
@@ -66,7 +68,8 @@ def cell_shape(space: Space, kind: CellKind) -> CellShape:
         weights=matrix(*weights.ravel().tolist()),
         signs=matrix(*np.sign(weights).ravel().tolist()),
         Modes=space.mat(modes, d),
-        measure=_measure(space, kind, modes),
+        measure=_measure(space, kind, axes),
+        spread=_spread(space, weights),
     )
 
 
@@ -89,10 +92,11 @@ def _cofactor(space: Space) -> wp.Function:
 
 
 @cache
-def _measure(space: Space, kind: CellKind, modes: int) -> wp.Function:
-    real, Modes, tensor, d = space.real, space.mat(modes, space.dim), space.types.tensor, space.dim
+def _measure(space: Space, kind: CellKind, axes: tuple[tuple[int, ...], ...]) -> wp.Function:
+    real, Modes, tensor, d = space.real, space.mat(len(axes), space.dim), space.types.tensor, space.dim
     cofactor, size = _cofactor(space), 2.0**space.dim if kind.grid else kind.volume
     third, warped = 1.0 / 3.0, kind.grid and d == 3
+    twists = [axes.index(pair) for pair in ((0, 1), (0, 2), (1, 2))] if warped else []
 
     @wp.func
     def measure(x: Modes):
@@ -107,7 +111,9 @@ def _measure(space: Space, kind: CellKind, modes: int) -> wp.Function:
         frame = linear / det  # rows ∇ξ_a, of the cell's linear part
         gradient = Modes()
         if wp.static(warped):  # faces of four corners need not be plane: B of the mean over the cell
-            h01, h02, h12 = x[3], x[4], x[5]
+            h01 = x[wp.static(twists[0])]
+            h02 = x[wp.static(twists[1])]
+            h12 = x[wp.static(twists[2])]
             m0 = linear[0] + real(third) * wp.cross(h01, h02)
             m1 = linear[1] + real(third) * wp.cross(h12, h01)
             m2 = linear[2] + real(third) * wp.cross(h02, h12)
@@ -118,9 +124,9 @@ def _measure(space: Space, kind: CellKind, modes: int) -> wp.Function:
                 gradient[0, k] = m0[k]
                 gradient[1, k] = m1[k]
                 gradient[2, k] = m2[k]
-                gradient[3, k] = r01[k]
-                gradient[4, k] = r02[k]
-                gradient[5, k] = r12[k]
+                gradient[wp.static(twists[0]), k] = r01[k]
+                gradient[wp.static(twists[1]), k] = r02[k]
+                gradient[wp.static(twists[2]), k] = r12[k]
         else:
             for a in range(wp.static(d)):
                 for k in range(wp.static(d)):
@@ -129,3 +135,18 @@ def _measure(space: Space, kind: CellKind, modes: int) -> wp.Function:
         return gradient, wp.ddot(x, gradient) / real(d), frame
 
     return measure
+
+
+def _spread(space: Space, weights: np.ndarray) -> wp.Function:
+    """B → Σ_k (Σ_a T_ka B_a) ⊗ (Σ_b T_kb B_b) = Bᵀ (TᵀT) B, a and b the linear modes."""
+    tensor, d = space.types.tensor, space.dim
+    shared = tensor(*(weights[:, :d].T @ weights[:, :d]).ravel().tolist())
+
+    @wp.func
+    def spread(B: space.mat(weights.shape[1], d)):
+        linear = tensor()
+        for a in range(wp.static(d)):
+            linear[a] = B[a]
+        return wp.transpose(linear) * shared * linear
+
+    return spread

@@ -17,8 +17,6 @@ from ..physics.space import Space
 from ..state.body import Body
 from .cell_means import edges_function, frame_function
 
-DOUBLINGS = 7  # of the power method, which then tells eigenvalues apart that differ by 3 %
-
 
 class Spacing:
     """Measures the rate of the fastest wave across each cell, its speed over the cell's spacing.
@@ -60,10 +58,6 @@ def _spacing_kernel(space: Space, kind: CellKind):
         if wp.trace(stiff) <= real(0.0):
             result[a] = real(0.0)  # a folded cell: its kernels are round
             return
-        power = stiff / wp.trace(stiff)
-        for _ in range(DOUBLINGS):
-            power = power * power
-            power = power / wp.trace(power)
-        result[a] = wp.sqrt(wp.trace(stiff * power) / auxiliary.density[a])
+        result[a] = wp.sqrt(space.algebra.largest(stiff) / auxiliary.density[a])
 
     return spacing
