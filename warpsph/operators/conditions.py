@@ -14,6 +14,7 @@ from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.resolve import BoundaryTable
 from ..state.clock import END, NON_FINITE, TOO_FAST, Clock
+from .held import held_table, held_types
 
 # In one step the surroundings of a node deform by no more than this share of their size. Waves cross less than a
 # cell in a step: neighbours would part faster than waves travel. A body that moves as a whole may be of any speed.
@@ -25,8 +26,8 @@ class ConditionTypes:
     """Warp side of the conditions.
 
     Attributes:
-        Table: struct of arrays: `row` (n,), the row of each node or −1; what `BoundaryTable` holds, a row each;
-            `drive`, the values of the functions of time (see `Clock`); `turned`, the rotation R of an edge.
+        Table: `held`, the velocities (`warpsph.operators.held`); what `BoundaryTable` has of stresses, a row each;
+            `turned`, the rotation R of an edge.
         apply: (node, φ, HALF or END, Table) → φ after v ← P v + Σ a_k f_k and
             σ ← R (Π(Rᵀ σ R) + Σ G_k Rᵀ t_k f_k) Rᵀ: faces turn with R, tractions t_k keep their directions.
     """
@@ -38,34 +39,28 @@ class ConditionTypes:
 @cache
 def condition_types(space: Space, loaded: bool) -> ConditionTypes:
     """The table and the function of one continuum in one precision; `loaded` where tractions are not all zero."""
-    types, phi, size = space.types, space.phi, space.continuum.stress_size
+    types, phi, size, (Held, hold) = space.types, space.phi, space.continuum.stress_size, held_types(space)
 
     @wp.struct
     class Table:
-        row: wp.array(dtype=wp.int32)
-        velocity_projector: wp.array(dtype=types.tensor)
+        held: Held
         stress_projector: wp.array(dtype=space.mat(size, size))
-        amplitude: wp.array2d(dtype=types.vector)
-        function: wp.array2d(dtype=wp.int32)
         traction: wp.array2d(dtype=types.vector)
         traction_stress: wp.array2d(dtype=space.mat(size, space.dim))
         traction_function: wp.array2d(dtype=wp.int32)
-        drive: wp.array2d(dtype=space.real)
         turned: wp.array(dtype=types.tensor)
 
     @wp.func
     def apply(i: int, values: phi.phi, when: int, table: Table):
-        row = table.row[i]
+        row = table.held.row[i]
         if row < 0:
             return values
-        v = table.velocity_projector[row] * phi.velocity(values)
-        for k in range(table.amplitude.shape[1]):
-            v += table.drive[when, table.function[row, k]] * table.amplitude[row, k]
+        v = hold(i, phi.velocity(values), when, table.held)
         R = table.turned[row]
         sigma = table.stress_projector[row] * space.stress.transform(phi.stress(values), wp.transpose(R))
         if wp.static(loaded):
             for k in range(table.traction.shape[1]):
-                traction = table.drive[when, table.traction_function[row, k]] * table.traction[row, k]
+                traction = table.held.drive[when, table.traction_function[row, k]] * table.traction[row, k]
                 sigma += table.traction_stress[row, k] * (wp.transpose(R) * traction)
         return phi.with_stress(phi.with_velocity(values, v), space.stress.transform(sigma, R))
 
@@ -111,14 +106,8 @@ class Conditions:
 
     def _fill(self, boundary: BoundaryTable, n: int, space: Space) -> None:
         rows, size, types = len(boundary.nodes), space.continuum.stress_size, space.types
-        row = np.full(n, -1, dtype=np.int32)
-        row[boundary.nodes] = np.arange(rows, dtype=np.int32)
         for name, values, ndim, dtype in (
-            ("row", row, 1, wp.int32),
-            ("velocity_projector", boundary.velocity_projector, 1, types.tensor),
             ("stress_projector", boundary.stress_projector, 1, space.mat(size, size)),
-            ("amplitude", boundary.amplitude, 2, types.vector),
-            ("function", boundary.function, 2, wp.int32),
             ("traction", boundary.traction, 2, types.vector),
             ("traction_stress", boundary.traction_stress, 2, space.mat(size, space.dim)),
             ("traction_function", boundary.traction_function, 2, wp.int32),
@@ -126,7 +115,8 @@ class Conditions:
         ):
             shape, device = values.shape[:ndim], self._launcher.device
             setattr(self.table, name, wp.array(values, dtype=dtype, shape=shape, device=device))
-        self.table.drive = self._clock.drive
+        device, clock = self._launcher.device, self._clock
+        self.table.held = held_table(boundary, n, space=space, device=device, clock=clock)
 
     def refresh(self) -> None:
         """Nothing: all conditions are on nodes chosen once and for all."""
@@ -182,7 +172,7 @@ def turn_kernel(space: Space, conditions: ConditionTypes):
         table: conditions.Table,
     ):
         i = first + wp.tid()
-        row = table.row[i]
+        row = table.held.row[i]
         if row < 0:
             return
         if turns[row] == 1:

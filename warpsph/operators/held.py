@@ -1,8 +1,4 @@
-"""Conditions on velocities, as resolved by `warpsph.scene.resolve`: all that the scheme `cells` needs of them.
-
-v ← P v + Σ_k a_k f_k(t) at a constrained node. What a condition takes up is the force R with
-m dv/dt = f + R: it is what the body exerts on its surroundings, turned round.
-"""
+"""Conditions on velocities, as `warpsph.scene.resolve` puts them: v ← P v + Σ_k a_k f_k(t) at the node."""
 
 from functools import cache
 
@@ -16,7 +12,7 @@ from ..state.clock import Clock
 
 @cache
 def held_types(space: Space) -> tuple[type, wp.Function]:
-    """The table of the conditions, and (node, v, HALF or END, table) → v as they ask for."""
+    """The table, `row` of each node or −1, and (node, v, HALF or END, table) → v as the conditions ask for."""
     vector = space.types.vector
 
     @wp.struct
@@ -26,7 +22,6 @@ def held_types(space: Space) -> tuple[type, wp.Function]:
         amplitude: wp.array2d(dtype=vector)
         function: wp.array2d(dtype=wp.int32)
         drive: wp.array2d(dtype=space.real)
-        reaction: wp.array(dtype=vector)
 
     @wp.func
     def hold(i: int, v: vector, when: int, table: Held):
@@ -42,7 +37,7 @@ def held_types(space: Space) -> tuple[type, wp.Function]:
 
 
 def held_table(boundary: BoundaryTable, n: int, *, space: Space, device: wp.Device, clock: Clock):
-    """The table of resolved conditions on n nodes; `reaction` [N], a row each, is written by the steps."""
+    """The table of resolved conditions on n nodes."""
     table, types = held_types(space)[0](), space.types
     row = np.full(n, -1, dtype=np.int32)
     row[boundary.nodes] = np.arange(len(boundary.nodes), dtype=np.int32)
@@ -51,6 +46,5 @@ def held_table(boundary: BoundaryTable, n: int, *, space: Space, device: wp.Devi
     table.projector = wp.array(boundary.velocity_projector, dtype=types.tensor, device=device)
     table.amplitude = wp.array(boundary.amplitude, dtype=types.vector, shape=shape, device=device)
     table.function = wp.array(boundary.function, dtype=wp.int32, shape=shape, device=device)
-    table.reaction = wp.zeros(max(1, len(boundary.nodes)), dtype=types.vector, device=device)
     table.drive = clock.drive
     return table

@@ -189,12 +189,12 @@ def _project_kernel(space: Space, conditions: ConditionTypes):
     @wp.func
     def freed_part(face: types.vector, c: int, candidates: surface.Candidates, table: conditions.Table):
         """The part of a face's normal along the directions in which its traction must vanish."""
-        wall = table.conditions.row[candidates.node[c]]
+        wall = table.conditions.held.row[candidates.node[c]]
         if wall < 0:
             return face
         if wp.dot(candidates.scan_normal[c], face) > real(smooth):
             return types.vector()
-        return table.conditions.velocity_projector[wall] * face
+        return table.conditions.held.projector[wall] * face
 
     @forward_kernel
     def project(pairs: PairList, candidates: surface.Candidates, table: conditions.Table):
