@@ -114,17 +114,15 @@ def test_a_free_body_keeps_momentum_angular_momentum_and_energy_in_two_turns(kin
     mass = simulation.nodes.mass.numpy()
 
     def angular():
-        h = simulation.nodes.half.numpy()
-        x, v = (
-            (h["x"], h["v"]) if simulation.steps else (simulation.field("position"), simulation.field("velocity"))
-        )
-        return (mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum()
+        half = simulation.nodes.half.numpy()
+        (x, y), (u, v) = half["x"][:, :2].T, half["v"][:, :2].T
+        return (mass * (x * v - y * u)).sum()
 
     simulation.step()
     first, start = angular(), (mass[:, None] * simulation.field("velocity") ** 2).sum()
     simulation.run(until=2 * 2 * np.pi / omega)
     assert angular() == pytest.approx(first, rel=1e-10)
-    assert (mass[:, None] * simulation.field("velocity") ** 2).sum() == pytest.approx(start, rel=0.02)
+    assert (mass[:, None] * simulation.field("velocity") ** 2).sum() == pytest.approx(start, rel=5e-3)
 
 
 def standing_wave(shape):
@@ -186,7 +184,7 @@ def test_soil_at_rest_stays_at_rest(kind, damping):
     simulation = Simulation(scene, device="cpu")
     simulation.run()
     assert np.abs(simulation.field("velocity")).max() <= 1e-12 * 9.81 * 5.0
-    reaction = simulation.conditions.reaction.numpy()[:, 1]
+    reaction = simulation.stepper.reactions.numpy()[:, 1]
     assert reaction.sum() == pytest.approx(2000.0 * 9.81 * 0.5, rel=1e-10)
 
 

@@ -15,10 +15,11 @@ from ..device.compiling import forward_kernel
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cell_body import cell_node_types
+from ..state.cell_body import CONDITIONS, FLOW, FORCES, cell_node_types
 from ..state.cells import NodeCells, cell_in_slot, corner_place
 from ..state.clock import END, FOLDED, HALF, NON_FINITE, TOO_FAST
 from .cell_shape import CellShape, cell_shape
+from .conditions import MOST_A_STEP
 from .held import held_types
 
 # κ of a grid's cells: with a stress at the edge nodes taken from 1 − κ halves of a cell inside, n cells bend with
@@ -31,6 +32,28 @@ LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundin
 def numbers_of(space: Space, shape: CellShape) -> int:
     """How many numbers the strain pass leaves of a cell: A/n, (A/n) G v, and the part of each mode of it."""
     return 1 + space.dim**2 * (1 + shape.partial)
+
+
+@cache
+def _tensors(space: Space) -> tuple[wp.Function, wp.Function]:
+    """(cell, which, numbers) → one of the tensors that the strain pass has left of a cell, and what leaves it."""
+    real, tensor, d = space.real, space.types.tensor, space.dim
+
+    @wp.func
+    def tensor_at(c: int, which: int, numbers: wp.array2d(dtype=real)):
+        result = tensor()
+        for a in range(wp.static(d)):
+            for b in range(wp.static(d)):
+                result[a, b] = numbers[c, 1 + d * d * which + d * a + b]
+        return result
+
+    @wp.func
+    def put_tensor(c: int, which: int, value: tensor, numbers: wp.array2d(dtype=real)):
+        for a in range(wp.static(d)):
+            for b in range(wp.static(d)):
+                numbers[c, 1 + d * d * which + d * a + b] = value[a, b]
+
+    return tensor_at, put_tensor
 
 
 @cache
@@ -54,7 +77,7 @@ def kick_kernel(space: Space, moves: bool):
         else:
             nodes.half[i].x = point.x
         book = nodes.books[i]
-        book[1] += wp.float64(nodes.mass[i] * wp.dot(v - free, v))
+        book[CONDITIONS] += wp.float64(nodes.mass[i] * wp.dot(v - free, v))
         nodes.books[i] = book
 
     return kick
@@ -63,9 +86,9 @@ def kick_kernel(space: Space, moves: bool):
 @cache
 def strain_kernel(space: Space, kind: CellKind):
     """Of each cell, at the half step: A/n, (A/n) G v, and what its hourglass modes add to it."""
-    real, types, d = space.real, space.types, space.dim
+    real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
-    per_corner, T = 1.0 / kind.corners, shape.weights
+    per_corner, T, (_, put_tensor) = 1.0 / kind.corners, shape.weights, _tensors(space)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers = packed(wp.array2d(dtype=real))
 
@@ -93,9 +116,7 @@ def strain_kernel(space: Space, kind: CellKind):
         share = real(per_corner) * volume
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
-        for a in range(wp.static(d)):
-            for b in range(wp.static(d)):
-                numbers[c, wp.static(1) + d * a + b] = weighted[a, b]
+        put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             G = weighted / share
             for p in range(wp.static(shape.partial)):
@@ -104,9 +125,7 @@ def strain_kernel(space: Space, kind: CellKind):
                     if wp.static(shape.links[q][2] == p):
                         bend = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
                         part += wp.outer(bend, frame[wp.static(shape.links[q][1])])
-                for a in range(wp.static(d)):
-                    for b in range(wp.static(d)):
-                        numbers[c, 1 + d * d * (1 + p) + d * a + b] = share * part[a, b]
+                put_tensor(c, 1 + p, share * part, numbers)
 
     return strain
 
@@ -118,17 +137,14 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     internal, remembers = space.vec(max(1, len(law.internals))), len(law.internals) > 0
     cell_at, place_of = cell_in_slot(kind), corner_place(kind)
-    sign = shape.signs
+    sign, (tensor_at, _) = shape.signs, _tensors(space)
     packed_nodes, packed_numbers = packed(CellNodes), packed(wp.array2d(dtype=real))
 
     @wp.func
     def corner_gradient(c: int, k: int, numbers: wp.array2d(dtype=real)):
-        g = types.tensor()
-        for a in range(wp.static(d)):
-            for b in range(wp.static(d)):
-                g[a, b] = numbers[c, 1 + d * a + b]
-                for p in range(wp.static(shape.partial)):
-                    g[a, b] += real(CORNER_SHARE) * sign[k, p] * numbers[c, 1 + d * d * (1 + p) + d * a + b]
+        g = tensor_at(c, 0, numbers)
+        for p in range(wp.static(shape.partial)):
+            g += (real(CORNER_SHARE) * sign[k, p]) * tensor_at(c, 1 + p, numbers)
         return g
 
     @forward_kernel
@@ -178,7 +194,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
             mean, lost = real(0.5) * (turned + sigma), trial - sigma
             work = space.stress.complementary(mean, lost, material.lame, material.shear, material.young)
             book = nodes.books[i]
-            book[2] += wp.float64(volume * work)
+            book[FLOW] += wp.float64(volume * work)
             nodes.books[i] = book
         u = nodes.displacement[i] + dt * half.v
         nodes.displacement[i] = u
@@ -189,7 +205,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
             nodes.strained[i] = strained
             if strained > real(MOST_STRAIN):
                 outdated[0] = 1
-            if not wp.ddot(L, L) * dt * dt < real(1.0):
+            if not wp.ddot(L, L) * dt * dt < real(wp.static(MOST_A_STEP**2)):
                 faults[TOO_FAST] = 1
         nodes.point[i].phi = space.phi.with_stress(point.phi, sigma)
         nodes.volume[i] = volume
@@ -202,10 +218,10 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
 @cache
 def force_kernel(space: Space, kind: CellKind, law: Law):
     """Of each cell, at t^{n+1}: what its stress, and the viscosity that rough motion meets, do to its corners."""
-    real, types, d, n = space.real, space.types, space.dim, kind.corners
+    real, types, n = space.real, space.types, kind.corners
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     T, per_corner, size = shape.weights, 1.0 / kind.corners, space.continuum.stress_size
-    sign = shape.signs
+    sign, (tensor_at, _) = shape.signs, _tensors(space)
     Parts = space.mat(max(1, shape.partial), size)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers, packed_forces = packed(wp.array2d(dtype=real)), packed(wp.array2d(dtype=types.vector))
@@ -244,36 +260,24 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
         B, volume, frame = shape.measure(x)
         share = real(per_corner) * volume
         # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² a bound of the cell's own frequencies.
-        stiff = real(0.0)
-        for k in range(wp.static(n)):
-            gradient = types.vector()
-            for m in range(wp.static(d)):
-                gradient += T[k, m] * B[m]
-            stiff += wp.length_sq(gradient)
-        stiff = real(n) * wave_speed * wave_speed * stiff / (volume * volume)
+        stiff = real(n) * wave_speed * wave_speed * wp.trace(shape.spread(B)) / (volume * volume)
         eta = real(0.0)
         if dt > real(0.0):
             eta = wp.min(real(0.5) * dt, real(1.0) / (dt * stiff))
-        per_share, G = real(1.0) / numbers[c, 0], types.tensor()
-        for a in range(wp.static(d)):
-            for b in range(wp.static(d)):
-                G[a, b] = per_share * numbers[c, 1 + d * a + b]
+        per_share = real(1.0) / numbers[c, 0]
+        G = per_share * tensor_at(c, 0, numbers)
         whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
         tau = eta * (whole - real(per_corner) * mean_rate)
         S = real(per_corner) * mean + tau
         F = shape.Modes()
         for m in range(wp.static(shape.modes)):
             F[m] = space.stress.traction(S, B[m])
-        power = volume * space.stress.complementary(
-            tau, whole, material.lame, material.shear, material.young
-        )  # τ : G v, since Dₑ : G v is at hand
+        # τ : G v, since Dₑ : G v is at hand.
+        power = volume * space.stress.complementary(tau, whole, material.lame, material.shear, material.young)
         if wp.static(shape.partial > 0):
             W = Parts()
             for p in range(wp.static(shape.partial)):
-                Y = types.tensor()
-                for a in range(wp.static(d)):
-                    for b in range(wp.static(d)):
-                        Y[a, b] = per_share * numbers[c, 1 + d * d * (1 + p) + d * a + b]
+                Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
                 W[p] = real(CORNER_SHARE) * stress_parts[p] + rough
@@ -314,6 +318,7 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         table: NodeCells,
         forces: wp.array2d(dtype=types.vector),
         nodes: CellNodes,
+        reactions: wp.array(dtype=types.vector),
         faults: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
@@ -336,12 +341,12 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         free = wp.exp(-damping * h) * v_half + h * a
         v = hold(i, free, END, held)
         book = nodes.books[i]
-        book[0] += wp.float64(dt * mass * wp.dot(b, v_half))
-        book[1] += wp.float64(mass * wp.dot(v - free, v_half))
+        book[FORCES] += wp.float64(dt * mass * wp.dot(b, v_half))
+        book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
         nodes.books[i] = book
         row = held.row[i]
         if row >= 0 and h > real(0.0):
-            held.reaction[row] = (mass / h) * (v - free)
+            reactions[row] = (mass / h) * (v - free)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi

@@ -53,18 +53,26 @@ class Body:
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
         """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
-        law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
-        slots = has_slots(scene.mesh)
+        device, shared = launcher.device, shared_parts(scene, space, launcher)
         return Body(
-            scene=scene,
-            space=space,
-            kind=kind,
-            law=law,
-            parameters=law.fill(scene.material),
             nodes=material_nodes(scene, space, device),
-            internals=material_internals(scene, law, space, device),
-            auxiliary=auxiliary_nodes(scene, space, kind, device),
-            slots=slots,
-            node_cells=node_cells(scene.mesh, slots, device),
-            launcher=launcher,
+            auxiliary=auxiliary_nodes(scene, space, shared["kind"], device),
+            **shared,
         )
+
+
+def shared_parts(scene: Scene, space: Space, launcher: Launcher) -> dict[str, object]:
+    """What every scheme's body of a scene has alike, by attribute."""
+    law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
+    slots = has_slots(scene.mesh)
+    return {
+        "scene": scene,
+        "space": space,
+        "kind": kind,
+        "law": law,
+        "parameters": law.fill(scene.material),
+        "internals": material_internals(scene, law, space, device),
+        "slots": slots,
+        "node_cells": node_cells(scene.mesh, slots, device),
+        "launcher": launcher,
+    }

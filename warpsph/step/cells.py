@@ -41,6 +41,7 @@ class CellStepper(Stepper):
     Attributes:
         body: nodes, cells and material.
         conditions: the table of the conditions.
+        reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
 
     Raises:
@@ -62,6 +63,7 @@ class CellStepper(Stepper):
             (cells, numbers_of(space, cell_shape(space, body.kind))), dtype=real, device=device
         )
         self._forces = wp.zeros((cells, body.kind.corners), dtype=space.types.vector, device=device)
+        self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self._limit = CellLimit(body, clock)
         self._kick = kick_kernel(space, moves)
@@ -92,7 +94,7 @@ class CellStepper(Stepper):
         inputs = [body.parameters, wave_speed, dt, body.corners, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
         inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
-        launch(self._push, points, [*inputs, nodes, faults])
+        launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         clock.tick()
 
 

@@ -28,7 +28,7 @@ class Stepper(ABC):
     def __init__(self, launcher: Launcher, clock: Clock, *, parts: Sequence[Part]):
         self.clock, self.parts, self._launcher = clock, tuple(parts), launcher
         self._recording: Recording | None = None
-        self._recorded: tuple[int, ...] = ()
+        self._recorded: tuple[int, ...] | None = None
 
     @property
     @abstractmethod
@@ -45,7 +45,7 @@ class Stepper(ABC):
 
     def arrays_recorded(self) -> tuple[int, ...]:
         """Addresses of arrays that may be replaced: the step is then recorded anew."""
-        return (0,)
+        return ()
 
     def advance(self, times: Sequence[float], dt: float, courant: float) -> Outcome:
         """Make a step from each of the times to Δt later; fewer when the host is needed before.
