@@ -14,7 +14,7 @@ from .campaign import Result
 from .cases import Case
 from .settings import COURANT, Setting
 
-COLOURS = dict(zip(SCHEMES, ("#1f77b4", "#2ca02c", "#7f7f7f", "#d62728"), strict=True))
+COLOURS = {scheme: f"C{number}" for number, scheme in enumerate(SCHEMES)}
 LINES = dict(zip(COURANT, ((":", "s"), ("-", "o"), ("--", "^"), ("-.", "D")), strict=True))
 OTHERS = ("#d62728", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22", "#17becf")
 COSTS = (("node_steps", "node-steps"), ("wall_s", "wall time [s]"))
