@@ -27,7 +27,10 @@ __version__ = "0.1.0"
 
 def __getattr__(name: str):
     """A public name, or their list: imported when first asked for, as the command answers Ctrl-C before it is."""
-    public = import_module(".public", __name__)
+    try:
+        public = import_module(".public", __name__)
+    except AttributeError as error:  # else `from warpsph import …` would say that the name is unknown
+        raise ImportError(f"warpsph can not be imported: {error}") from error
     if name == "__all__" or name in getattr(public, "__all__", ()):  # it has none yet while it is being imported
         return globals().setdefault(name, getattr(public, name))
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
