@@ -31,3 +31,12 @@ def test_name_that_is_not_public_is_no_attribute():
         _ = warpsph.Sceme
     with pytest.raises(ImportError, match="cannot import name 'Sceme'"):
         exec("from warpsph import Sceme")
+
+
+def test_an_import_that_fails_says_why(monkeypatch):
+    def fails(name, package):
+        raise AttributeError("the cause")
+
+    monkeypatch.setattr(warpsph, "import_module", fails)
+    with pytest.raises(ImportError, match="the cause"):
+        warpsph.__getattr__("Box")
