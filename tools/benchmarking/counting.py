@@ -49,13 +49,18 @@ TRAFFIC = {
             "body.nodes.smoothing_length",
             "body.nodes.density",
             "body.nodes.velocity_gradient",
-            "conditions.table.row",
+            "conditions.table.held.row",
         ),
         ("body.nodes.point", "body.nodes.half_velocity", "body.nodes.velocity_gradient"),
     ),
     "conditions": (
         1,
-        ("body.nodes.point", "body.nodes.displacement", "body.nodes.velocity_gradient", "conditions.table.row"),
+        (
+            "body.nodes.point",
+            "body.nodes.displacement",
+            "body.nodes.velocity_gradient",
+            "conditions.table.held.row",
+        ),
         ("body.nodes.point",),
     ),
     "motion": (
