@@ -352,3 +352,25 @@ def test_elastic_flag_swings_and_comes_back():
         assert u[(time > begin) & (time < end)].min() == pytest.approx(-128.8, rel=0.02)
     for begin, end in ((0.7, 1.1), (1.6, 1.9)):
         assert u[(time > begin) & (time < end)].max() == pytest.approx(1.5, abs=2.0)
+
+
+def test_time_step_follows_cells_that_are_pressed():
+    """Uniaxial strain to four fifths of the height, slowly: squares become 5 : 4, and Δx is their height.
+
+    It is measured anew every 2 % of strain; waves of the press itself strain by v/c_p = 0.5 %.
+    """
+    scene = Scene(
+        shape=Box((1.0, 1.0), 0.25),
+        material=SOFT,
+        conditions=[
+            *(Roller(edge(side)) for side in ("left", "right", "bottom")),
+            PrescribedVelocity(edge("top"), (None, -0.2)),
+        ],
+        duration=1.0,
+        numerics=NUMERICS,
+    )
+    simulation = Simulation(scene, device="cpu")
+    start = simulation.time_step_limit
+    simulation.run()
+    assert simulation.field("position")[:, 1].max() == pytest.approx(0.8, abs=1e-9)
+    assert simulation.time_step_limit / start == pytest.approx(0.8, abs=0.03)
