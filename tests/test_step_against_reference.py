@@ -91,7 +91,7 @@ def state_of(simulation):
 
 def compatible_state_of(simulation):
     table = simulation.stepper.conditions.table
-    row, turned = table.row.numpy(), table.turned.numpy().astype(float)
+    row, turned = table.held.row.numpy(), table.turned.numpy().astype(float)
     angle = np.where(row >= 0, np.arctan2(turned[row, 1, 0], turned[row, 0, 0]), 0.0)
     return state_of(simulation) | {"u": simulation.field("displacement").astype(float), "angle": angle}
 
