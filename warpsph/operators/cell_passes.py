@@ -214,7 +214,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
         half, point = nodes.half[i], nodes.point[i]
         turned, strained_by = space.phi.stress(point.phi), dt * rate
         if wp.static(moves and d > 1):
-            # L is in the axes of the half step: half of the turn comes before, half after it. With all of it before,
+            # L is in the axes of the half step: half of the turn comes before it, half after. With all before,
             # stresses lag behind their forces by half a step's turn, and pump energy into a body that spins.
             half_turn = space.algebra.rotation(L, real(0.5) * dt)
             turned = space.stress.transform(turned, half_turn * half_turn)
