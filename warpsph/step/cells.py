@@ -76,13 +76,13 @@ class CellStepper(Stepper):
         self._means.rate = wp.zeros(cells if c else 1, dtype=space.types.tensor, device=device)
         self._means.stress = wp.zeros(cells if c else 1, dtype=space.types.stress, device=device)
         self._kick = kick_kernel(space, moves)
-        self._strain = strain_kernel(space, kind, body.law.flows)
-        self._rate = rate_kernel(space, kind, slots, share)
+        self._strain = strain_kernel(space, kind, body.law.flows, share)
+        self._rate = rate_kernel(space, kind, slots)
         self._rate_mean = rate_mean_kernel(space, kind)
         self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=c > 0.0)
         self._stress_mean = stress_mean_kernel(space, kind)
         self._sharpen = sharpen_kernel(space, kind, slots)
-        self._force = force_kernel(space, kind, body.law, corner_share=share, sharp=c > 0.0)
+        self._force = force_kernel(space, kind, body.law, c > 0.0)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
         if c > 0.0:
