@@ -3,6 +3,8 @@ a setting."""
 
 import numpy as np
 import pytest
+from warpsph.operators.checkerboard import STRESS_SHARE
+from warpsph.step.compatible import VELOCITY_SHARE
 
 from warpsph import (
     BodyForce,
@@ -23,8 +25,6 @@ from warpsph import (
     region,
 )
 from warpsph.cli.catalogue import load
-from warpsph.operators.checkerboard import STRESS_SHARE
-from warpsph.step.compatible import VELOCITY_SHARE
 
 from .motions import SOFT, Energies, hanging_bar, return_error, standing_mode
 

@@ -27,17 +27,17 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from warpsph.operators.checkerboard import STRESS_SHARE
+from warpsph.operators.front import STRENGTH
+from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
 from warpsph.device.precision import PRECISIONS
 from warpsph.errors import WarpSPHError
 from warpsph.mesh.continuum import CONTINUA
-from warpsph.operators.checkerboard import STRESS_SHARE
-from warpsph.operators.front import STRENGTH
 from warpsph.operators.neighbour_sums import EDGE
 from warpsph.scene.numerics import Numerics
 from warpsph.scene.registry import KERNELS
 from warpsph.scene.scheme import SCHEMES
-from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
 ANALYSED = tuple(name for name, scheme in SCHEMES.items() if scheme.stepper is None)
 COURANT = (0.3, 0.5, 0.8, 0.95)

@@ -10,7 +10,7 @@ from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.scene import Scene
 from .body import Body, shared_parts
-from .cells import cell_table
+from .cells import NodeCells, cell_table, has_slots, node_cells
 
 # Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
 FORCES, CONDITIONS, FLOW = 0, 1, 2
@@ -45,7 +45,7 @@ def cell_node_types(space: Space) -> tuple[type, type]:
 
 @dataclass(frozen=True, kw_only=True)
 class CellBody(Body):
-    """A body as the scheme `cells` keeps it: auxiliary nodes remember nothing, and nothing of them is kept.
+    """A body as the scheme `cells` keeps it.
 
     Attributes:
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
@@ -54,9 +54,13 @@ class CellBody(Body):
             all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
             `strained` ∫ |d| dt since the step was last measured.
         corners: node indices of each cell, shape (m, c).
+        slots: whether `node_cells` has them.
+        node_cells: the cells around each node.
     """
 
     corners: wp.array
+    slots: bool
+    node_cells: NodeCells
 
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> "CellBody":
@@ -82,8 +86,14 @@ class CellBody(Body):
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
-        corners = cell_table(mesh, mesh.kind, device)
-        return CellBody(nodes=nodes, auxiliary=None, corners=corners, **shared_parts(scene, space, launcher))
+        slots = has_slots(mesh)
+        return CellBody(
+            nodes=nodes,
+            corners=cell_table(mesh, mesh.kind, device),
+            slots=slots,
+            node_cells=node_cells(mesh, slots, device),
+            **shared_parts(scene, space, launcher),
+        )
 
     def density(self) -> np.ndarray:
         """ρ = m/V of the nodes [kg/mᵈ], shape (n,)."""

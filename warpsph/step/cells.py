@@ -51,9 +51,6 @@ class CellStepper(Stepper):
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
         if scene.boundary.loaded:
             raise SceneError("conditions", scene.conditions, "velocity_scheme cells takes no tractions")
-        if scene.numerics.source_scheme != "analytic":
-            allowed = "velocity_scheme cells takes analytic only"
-            raise SceneError("source_scheme", scene.numerics.source_scheme, allowed)
         clock = Clock(scene.body_force, scene.boundary.functions, space, launcher)
         self.body = body = CellBody.of(scene, space, launcher)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
@@ -108,13 +105,7 @@ def spacing(mesh: Mesh) -> float:
 CELLS = Scheme(
     name="cells",
     meaning="cells in energy-conjugate form: any cell, any configuration, free edges for nothing",
-    fluxes=None,
-    motion=None,
-    unloads=True,
-    follows_cells=True,
-    courant_limit=lambda dim, moment: 1.0,
-    largest_support=lambda dim: float("inf"),
-    kinds=tuple(KINDS.values()),
     stepper=CellStepper,
+    kinds=tuple(KINDS.values()),
     spacing=spacing,
 )
