@@ -284,9 +284,6 @@ def test_what_the_scheme_has_not_is_refused_in_one_line():
     loaded = Scene(**scene, numerics=NUMERICS, conditions=[Fixed(edge("bottom")), Pulled(edge("top"))])
     with pytest.raises(SceneError, match="cells takes no tractions"):
         Simulation(loaded, device="cpu")
-    rk4 = Scene(**scene, numerics=Numerics(velocity_scheme="cells", source_scheme="rk4"))
-    with pytest.raises(SceneError, match="cells takes analytic only"):
-        Simulation(rk4, device="cpu")
 
 
 class Tip:

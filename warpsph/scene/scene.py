@@ -134,7 +134,7 @@ class Scene:
         if self.numerics.scheme.sums is not None:
             surface = self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else []
             check_thickness(self.mesh, self.boundary, surface)
-        _ = self.initial_velocity, self.initial_stress, self.initial_internals
+        _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")

@@ -96,5 +96,8 @@ class CellBody(Body):
         )
 
     def density(self) -> np.ndarray:
-        """ρ = m/V of the nodes [kg/mᵈ], shape (n,)."""
-        return self.nodes.mass.numpy() / self.nodes.volume.numpy()
+        """ρ of the nodes [kg/mᵈ], shape (n,): m over the volume of their cells as they are now."""
+        mesh = self.scene.mesh
+        if self.scene.large_displacements:
+            mesh = mesh.with_nodes(mesh.nodes + self.nodes.displacement.numpy())
+        return self.nodes.mass.numpy() / mesh.node_volumes()[0]
