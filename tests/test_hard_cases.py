@@ -10,7 +10,6 @@ from warpsph import (
     Elastic,
     Fixed,
     Free,
-    FreeSurface,
     Numerics,
     PerzynaVonMises,
     PrescribedVelocity,
@@ -24,7 +23,7 @@ from warpsph import (
 )
 from warpsph.cli.catalogue import load
 
-from .motions import SOFT, Energies, hanging_bar, return_error, standing_mode
+from .motions import SOFT, Energies, return_error, standing_mode
 
 
 def run_with_energy(scene, every=1, observe=lambda simulation: None, bending=False):
@@ -190,8 +189,7 @@ def momenta(simulation):
     return *(m @ v), m @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
 
 
-@pytest.mark.parametrize("free_surface", [None, FreeSurface()])
-def test_free_square_keeps_spinning_as_it_does(free_surface):
+def test_free_square_keeps_spinning_as_it_does():
     """Nothing acts on it: linear momentum stays zero to rounding, angular momentum and energy to 1 % in two turns.
 
     They need not be exact: the square bulges by 1.5 % and swings, and its edges' normals are fitted, or
@@ -199,7 +197,7 @@ def test_free_square_keeps_spinning_as_it_does(free_surface):
     lagged by half a degree would leave a traction along the edge and add 6 % to the angular momentum;
     measured 4·10⁻⁴ and 7·10⁻³.
     """
-    simulation, energies = run_with_energy(spinning(10, 2.0, free_surface=free_surface), observe=momenta)
+    simulation, energies = run_with_energy(spinning(10, 2.0), observe=momenta)
     along_x, along_y, angular = np.array(energies.also).T
     scale = simulation.field("mass").sum() * 2.5
     assert max(np.abs(along_x).max(), np.abs(along_y).max()) <= 1e-10 * scale
@@ -247,7 +245,6 @@ def test_strip_pulled_almost_to_the_end_of_its_material():
         shape=Box((1.0, 0.5), 0.0625),
         material=SOFT,
         conditions=[Roller(edge("left")), PrescribedVelocity(edge("right"), (speed, None))],
-        free_surface=FreeSurface(),
         velocity=lambda x, y: (speed * x, -3.0 / 7.0 * speed * y),
         duration=(stretch - 1.0) / speed,
     )
@@ -326,9 +323,8 @@ def test_needle_two_cells_wide_rings_along_its_axis():
     assert return_error(scene) <= 5e-3
 
 
-@pytest.mark.parametrize("free_surface", [None, FreeSurface()])
 @pytest.mark.parametrize("gravity", [0.0005, 0.05])
-def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surface):
+def test_needle_two_cells_wide_bends_without_gaining_energy(gravity):
     """A cantilever 40 cells long, small and large (0.06 L) deflections, half a period: total energy, zero
     at the start.
 
@@ -339,7 +335,6 @@ def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surfac
         shape=Box((1.0, 0.05), 0.025),
         material=SOFT,
         conditions=[Fixed(edge("left"))],
-        free_surface=free_surface,
         body_force=BodyForce((0.0, -gravity)),
         duration=2.0,
     )

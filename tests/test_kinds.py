@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from warpsph import Box, Elastic, Scene, SceneError, Shape
+from warpsph import Box, Elastic, Numerics, Scene, SceneError, Shape
 from warpsph.device.precision import PRECISIONS
 from warpsph.mesh.kinds import GRID_KINDS, HEXAHEDRON, KINDS, QUAD, TETRAHEDRON, TRIANGLE
 from warpsph.mesh.mesh import Mesh

@@ -118,6 +118,7 @@ def model_of(scene):
         "right": edge("right").nodes(scene.mesh),
         "top": edge("top").nodes(scene.mesh) & (nodes[:, 0] > 0.62),
         "top_velocity": footing,
+        "x0": nodes,
         "wave_speed": MATERIAL.wave_speed(2),
     }
 

@@ -113,18 +113,25 @@ def held(v, t, model):
     return v
 
 
+def volumes(x, model):
+    """V_i = sum_p w_p over the corners p at each node."""
+    volume = np.zeros(len(x))
+    for cell in model["cells"]:
+        volume[cell] += area_and_slopes(x[cell])[0] / len(cell)
+    return volume
+
+
 def nodal_gradients(x, v, model):
-    """V_i and L_i = sum_p w_p G_p v / V_i over the corners p at each node."""
-    volume, L = np.zeros(len(x)), np.zeros((len(x), 2, 2))
+    """L_i = sum_p w_p G_p v / V_i over the corners p at each node."""
+    L = np.zeros((len(x), 2, 2))
     for cell in model["cells"]:
         weight = area_and_slopes(x[cell])[0] / len(cell)
         g = corner_gradients(x[cell], CORNER_SHARE)
         for p, i in enumerate(cell):
-            volume[i] += weight
             for k, j in enumerate(cell):
                 L[i] += weight * np.outer(v[j], g[p, k])
-    volume = np.maximum(volume, LEAST_VOLUME * model["mass"] / model["rho0"])
-    return volume, L / volume[:, None, None]
+    volume = np.maximum(volumes(x, model), LEAST_VOLUME * model["mass"] / model["rho0"])
+    return L / volume[:, None, None]
 
 
 def forces(x, x_half, v_half, sigma, L, dt, model):
@@ -132,10 +139,11 @@ def forces(x, x_half, v_half, sigma, L, dt, model):
     f = np.zeros_like(x)
     for cell in model["cells"]:
         n = len(cell)
-        area, slopes = area_and_slopes(x[cell])
+        (area, slopes), area0 = area_and_slopes(x[cell]), area_and_slopes(model["x0"][cell])[0]
         smooth, whole = corner_gradients(x[cell], CORNER_SHARE), corner_gradients(x[cell], 1.0)
         before = corner_gradients(x_half[cell], 1.0)
-        frequency2 = n * model["wave_speed"] ** 2 * np.sum(slopes**2) / area**2
+        speed2 = model["wave_speed"] ** 2 * area / area0  # the mass stays, and so does the stiffness
+        frequency2 = n * speed2 * np.sum(slopes**2) / area**2
         eta = min(0.5 * dt, 1.0 / (dt * frequency2))
         rates = [elastic(L[i], model) for i in cell]
         if n == 4:  # what alternates along both axes is no part of a gradient
@@ -159,7 +167,7 @@ def slow_cells_step(state: dict, model: dict, t: float, dt: float) -> dict:
 
     v_half = held(damped * (v + h * a), t + h, model)
     x_half = x + h * v_half if moves else x
-    volume, L = nodal_gradients(x_half, v_half, model)
+    L = nodal_gradients(x_half, v_half, model)
     for i in range(len(x)):
         stress = turned(full(sigma[i]), L[i], dt) if moves else full(sigma[i])
         stress, eps[i] = relax(stress + dt * elastic(L[i], model), eps[i], dt, model)
@@ -168,4 +176,5 @@ def slow_cells_step(state: dict, model: dict, t: float, dt: float) -> dict:
     f = forces(x, x_half, v_half, sigma, L, dt, model)
     a = f / model["mass"][:, None] + np.asarray(model["body_force"](t + dt), dtype=float)
     v = held(damped * v_half + h * a, t + dt, model)
-    return {"x": x, "v": v, "a": a, "sigma": sigma, "eps": eps, "rho": model["mass"] / volume, "L": L}
+    rho = model["mass"] / volumes(x, model)
+    return {"x": x, "v": v, "a": a, "sigma": sigma, "eps": eps, "rho": rho, "L": L}

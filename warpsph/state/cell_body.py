@@ -54,11 +54,13 @@ class CellBody(Body):
             all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
             `strained` ∫ |d| dt since the step was last measured.
         corners: node indices of each cell, shape (m, c).
+        cell_mass: mass of each cell [kg], constant, shape (m,).
         slots: whether `node_cells` has them.
         node_cells: the cells around each node.
     """
 
     corners: wp.array
+    cell_mass: wp.array
     slots: bool
     node_cells: NodeCells
 
@@ -90,6 +92,7 @@ class CellBody(Body):
         return CellBody(
             nodes=nodes,
             corners=cell_table(mesh, mesh.kind, device),
+            cell_mass=wp.array(scene.material.density * mesh.cell_volumes(), dtype=space.real, device=device),
             slots=slots,
             node_cells=node_cells(mesh, slots, device),
             **shared_parts(scene, space, launcher),

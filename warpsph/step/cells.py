@@ -83,12 +83,13 @@ class CellStepper(Stepper):
         """Advance the nodes by the clock's Δt."""
         body, clock, launch = self.body, self.clock, self.body.launcher.launch
         nodes, points, dt, faults = body.nodes, body.nodes.point, clock.time_step, clock.faults
-        damping, wave_speed = body.scene.damping, body.scene.material.wave_speed(body.space.dim)
+        damping, material = body.scene.damping, body.scene.material
         launch(self._kick, points, [self.conditions, damping, dt, nodes], gathers=False)
         launch(self._strain, body.corners, [body.corners, nodes, self._numbers, faults])
-        inputs = [body.parameters, LEAST_VOLUME / body.scene.material.density, dt, body.node_cells]
+        inputs = [body.parameters, LEAST_VOLUME / material.density, dt, body.node_cells]
         launch(self._stress, points, [*inputs, self._numbers, nodes, body.internals, self._limit.outdated, faults])
-        inputs = [body.parameters, wave_speed, dt, body.corners, nodes, self._numbers]
+        modulus = material.density * material.wave_speed(body.space.dim) ** 2
+        inputs = [body.parameters, modulus, dt, body.corners, body.cell_mass, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
         inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
