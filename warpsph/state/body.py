@@ -44,6 +44,10 @@ class Body(ABC):
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,)."""
 
+    def stress(self) -> np.ndarray:
+        """σ of the nodes [Pa], stored components, shape (n, s)."""
+        return self.nodes.point.numpy()["phi"][:, self.space.dim :].copy()
+
 
 def shared_parts(scene: Scene, space: Space, launcher: Launcher) -> dict[str, object]:
     """What every scheme's body of a scene has alike, by attribute.
