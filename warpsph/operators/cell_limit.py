@@ -1,7 +1,7 @@
 """How much sooner than at the start a wave is across a cell of the scheme `cells`, looked at as the body strains.
 
 ω_T² = n c_p² λ_max(Σ_j ∇N_j ⊗ ∇N_j) bounds the frequencies of a cell; of a lattice's it is (2 c_p/Δx)². The
-stiffness stays what it is and so does a cell's mass: c_p² falls as a cell is pressed, and grows as it is stretched.
+stiffness and a cell's mass stay what they are: c_p² falls as a cell is pressed, and grows as it is stretched.
 """
 
 from functools import cache
