@@ -39,10 +39,10 @@ def run_with_energy(scene, every=1, observe=lambda simulation: None, bending=Fal
 def test_nearly_incompressible_body_does_not_lock(kind):
     """ν = 0.499. Both modes keep their volume, so ν enters by the number of steps only: c_p/c_s = 22.4.
 
-    The rough viscosity sees div v at the corners of cells, of which nodes see nothing: s² of the hourglass
-    modes, s = sin(kΔ/2), hence 2 s⁴/Δ² of div² v in the mean. With η = Δ²/(8 c_p² Δt) and λ ≈ ρ c_p² that takes s⁴/4 of
-    the amplitude a step. On top, the dispersion of the same mode with ν = 0.3. Locking would multiply the frequency.
-    With 20 cells measured 0.018 of 0.021 (S) and 0.037 of 0.058 (Lamé).
+    The rough viscosity sees div v at the corners of cells, of which nodes see nothing: with s = sin(kΔ/2) the
+    hourglass modes have s² of the amplitude, and div² v is 2 s⁴/Δ² in the mean. With η = Δ²/(8 c_p² Δt) and
+    λ ≈ ρ c_p² that takes s⁴/4 of the amplitude a step. On top, the dispersion of the same mode with ν = 0.3.
+    Locking would multiply the frequency. With 20 cells measured 0.018 of 0.021 (S) and 0.037 of 0.058 (Lamé).
     """
     material = Elastic(young_modulus=1e6, poisson_ratio=0.499, density=1000.0)
     scene = standing_mode(kind, 20, material=material)

@@ -53,9 +53,9 @@ class Scheme:
         meaning: one line.
         stepper: makes what advances a scene, a `warpsph.step.step.Stepper`, as `stepper(scene, space, launcher)`.
         kinds: kinds of cell it can take.
-        spacing: Δx of a mesh in the Courant number c_p Δt/Δx [m]. Without sums waves must be stable up to 1.
-        sums: what it has besides where it takes sums over neighbours. It then takes a smoothing kernel, waves are
-            stable up to 2 √m₂, an edge without a condition keeps what traction it has, and a `FreeSurface` frees
+        spacing: Δx of a mesh in the Courant number c_p Δt/Δx [m].
+        courant_limit: up to which Courant number waves are stable; of sums it is 2 √m₂.
+        sums: what it has besides where it takes sums over neighbours. It then takes a smoothing kernel, an edge without a condition keeps what traction it has, and a `FreeSurface` frees
             it; without sums such an edge is free.
     """
 
@@ -64,6 +64,7 @@ class Scheme:
     stepper: Callable
     kinds: tuple[CellKind, ...]
     spacing: Callable[[Mesh], float] = Mesh.smallest_distance
+    courant_limit: float | None = None
     sums: Sums | None = None
 
     def check_cells(self, mesh: Mesh) -> None:

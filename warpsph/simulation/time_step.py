@@ -91,10 +91,10 @@ class TimeStep:
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ of sums over neighbours (METHOD section 4), else 1."""
+    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ of sums over neighbours (METHOD section 4)."""
     numerics = scene.numerics
-    if numerics.scheme.sums is None:
-        return 1.0
+    if numerics.scheme.courant_limit is not None:
+        return numerics.scheme.courant_limit
     moment = second_moment(numerics.smoothing, ratio=numerics.smoothing_ratio, dim=scene.mesh.dim)
     return 2.0 * math.sqrt(moment)
 
