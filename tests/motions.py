@@ -109,9 +109,9 @@ def hanging_bar(cells, periods, material=HANGING, large_displacements=True, **nu
 class Energies:
     """Kinetic, elastic and potential energy of a run, sampled as it goes.
 
-    On a lattice the nodes' volumes are the weights of the trapezium rule. The elastic energy is taken of
-    the nodes' stresses, with the initial volumes, or of their means over the cells (`bending`). With Δt²/8 of m a²
-    off the kinetic energy, the sum is what leapfrog keeps of linear motion; without, it swings by (ωΔt)²/8.
+    On a lattice the nodes' volumes are the weights of the trapezium rule. The elastic energy is taken of the
+    stresses that are strained, with the initial volumes, or of their means over the cells (`bending`). With Δt²/8
+    of m a² off the kinetic energy, the sum is what leapfrog keeps of linear motion; without, it swings by (ωΔt)²/8.
     """
 
     def __init__(self, simulation, every=1, observe=lambda simulation: None, bending=False):
@@ -131,7 +131,8 @@ class Energies:
             self.sample(simulation)
 
     def sample(self, simulation):
-        v, s = simulation.field("velocity"), simulation.field("stress")[self._cells].mean(axis=1)
+        phi, dim = simulation.nodes.point.numpy()["phi"].astype(float), simulation.mesh.dim
+        v, s = phi[:, :dim], phi[:, dim:][self._cells].mean(axis=1)
         self.time.append(simulation.time)
         a = simulation.nodes.acceleration.numpy().astype(float)
         held = simulation.scene.boundary.nodes

@@ -257,7 +257,7 @@ def refusal(folder, scene=None, precision="float64"):
         {"damping": 2.1},
         {"duration": 1.1},
         {"free_surface": FreeSurface(normals="marrone")},
-        {"numerics": Numerics(kernel="wendland_c2")},
+        {"numerics": Numerics(velocity_scheme="taylor", kernel="wendland_c2")},
         {"numerics": Numerics(time_step=1e-4)},
         {"output": Output(interval=0.013)},
         {"output": Output(interval=0.014, probes=slope().output.probes)},

@@ -55,8 +55,9 @@ class Scheme:
         kinds: kinds of cell it can take.
         spacing: Δx of a mesh in the Courant number c_p Δt/Δx [m].
         courant_limit: up to which Courant number waves are stable; of sums it is 2 √m₂.
-        sums: what it has besides where it takes sums over neighbours. It then takes a smoothing kernel, an edge without a condition keeps what traction it has, and a `FreeSurface` frees
-            it; without sums such an edge is free.
+        sums: what it has besides where it takes sums over neighbours. It then takes a smoothing kernel, an edge
+            without a condition keeps what traction it has, and a `FreeSurface` frees it; without sums such an edge
+            is free.
     """
 
     name: str
