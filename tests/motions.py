@@ -110,8 +110,8 @@ class Energies:
     """Kinetic, elastic and potential energy of a run, sampled as it goes.
 
     On a lattice the nodes' volumes are the weights of the trapezium rule. The elastic energy is taken of the
-    stresses that are strained, with the initial volumes, or of their means over the cells (`bending`). With Δt²/8
-    of m a² off the kinetic energy, the sum is what leapfrog keeps of linear motion; without, it swings by (ωΔt)²/8.
+    stresses that are strained, with the initial volumes, or of their means over the cells (`bending`). With
+    Δt²/8 of m a² off the kinetic energy, the sum is what leapfrog keeps of linear motion; it swings without.
     """
 
     def __init__(self, simulation, every=1, observe=lambda simulation: None, bending=False):

@@ -355,8 +355,8 @@ def test_elastic_flag_swings_and_comes_back():
 def test_time_step_follows_cells_that_are_pressed():
     """Uniaxial strain to four fifths of the height, slowly: squares become 5 : 4, and Δx is their height.
 
-    A cell's mass and its stiffness stay, so that waves get slower by √(4/5), and a step is √(4/5) of the first. It is
-    measured anew every 2 % of strain; waves of the press itself strain by v/c_p = 0.5 %.
+    A cell's mass and its stiffness stay, so that waves get slower by √(4/5), and a step is √(4/5) of the first.
+    It is measured anew every 2 % of strain; waves of the press itself strain by v/c_p = 0.5 %.
     """
     scene = Scene(
         shape=Box((1.0, 1.0), 0.25),

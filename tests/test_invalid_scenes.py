@@ -141,7 +141,7 @@ def in_scene(name, build=lambda value: value):
         "material": Elastic(**ELASTIC),
         "duration": 1.0,
         "conditions": [Fixed(edge("bottom"))],
-        "numerics": Numerics(),
+        "numerics": Numerics(velocity_scheme="taylor"),
     }
     return lambda value: Scene(**{**right, name: build(value)})
 
@@ -267,11 +267,15 @@ WRONG = {
     "body_force": (in_scene("body_force"), nothing_of_ours, {"body_force"}),
     "acceleration": (in_scene("body_force", BodyForce), no_vectors, {"BodyForce.acceleration"}),
     "factor": (part(BodyForce, {"acceleration": (0.0, 1.0)}, "factor"), no_time_functions, {"BodyForce.factor"}),
-    "kernel": (part(Numerics, {}, "kernel"), no_names, {"kernel"}),
+    "kernel": (
+        part(Numerics, {"velocity_scheme": "taylor"}, "kernel"),
+        no_names.filter(lambda v: v is not None),
+        {"kernel"},
+    ),
     "velocity_scheme": (part(Numerics, {}, "velocity_scheme"), no_names, {"velocity_scheme"}),
-    "source_scheme": (part(Numerics, {}, "source_scheme"), no_names, {"source_scheme"}),
+    "source_scheme": (part(Numerics, {"velocity_scheme": "taylor"}, "source_scheme"), no_names, {"source_scheme"}),
     "smoothing_ratio": (
-        in_scene("numerics", lambda v: Numerics(smoothing_ratio=v)),
+        in_scene("numerics", lambda v: Numerics(velocity_scheme="taylor", smoothing_ratio=v)),
         st.one_of(not_positive.filter(lambda v: v is not None), st.floats(0.01, 0.5), st.floats(2.1, 1e9)),
         {"smoothing_ratio"},
     ),
@@ -440,6 +444,7 @@ def document():
                 PrescribedVelocity(edge("top"), (None, Table((0.0, 1.0), (0.0, 1.0)))),
             ],
             free_surface=FreeSurface(),
+            numerics=Numerics(velocity_scheme="taylor"),
             body_force=BodyForce((0.0, -9.81), Ramp(0.5)),
             velocity=lambda x, y: (0.0, 0.01),
             duration=1.0,

@@ -57,7 +57,8 @@ class Numerics:
             if self.sharpening is not None:
                 allowed = f"velocity_scheme {self.velocity_scheme} knows none; leave it out"
                 raise SceneError("sharpening", self.sharpening, allowed)
-            object.__setattr__(self, "kernel", choice("kernel", self.kernel or "gaussian", KERNELS))
+            kernel = "gaussian" if self.kernel is None else self.kernel
+            object.__setattr__(self, "kernel", choice("kernel", kernel, KERNELS))
             ratio = self.smoothing.smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
             object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))

@@ -131,10 +131,14 @@ class Scene:
         self.numerics.scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
         self.output.check(self.mesh, self.duration)
-        if self.numerics.scheme.sums is not None:
-            surface = self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else []
-            check_thickness(self.mesh, self.boundary, surface)
-        _ = self.boundary, self.initial_velocity, self.initial_stress, self.initial_internals
+        check_thickness(self.mesh, self.boundary, self._freed_nodes())
+        _ = self.initial_velocity, self.initial_stress, self.initial_internals
+
+    def _freed_nodes(self) -> np.ndarray:
+        """Indices of the nodes whose edges are free, conditions aside."""
+        if self.numerics.scheme.sums is None:
+            return np.unique(self.mesh.faces)
+        return self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else np.arange(0)
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
