@@ -57,7 +57,7 @@ def slope(**changed):
 
 def published_slope():
     """The same by sums over neighbours, with RK4 sources and a moving free surface."""
-    numerics = Numerics(velocity_scheme="taylor", source_scheme="rk4", courant=0.8)
+    numerics = Numerics(velocity_scheme="blanc-pastor", source_scheme="rk4")
     return slope(free_surface=FreeSurface(), numerics=numerics)
 
 
@@ -256,7 +256,7 @@ def refusal(folder, scene=None, precision="float64"):
         {"stress": lambda x, y: (0.0, 0.0, 0.0, 1e-9)},
         {"damping": 2.1},
         {"duration": 1.1},
-        {"free_surface": FreeSurface(normals="marrone")},
+        {"free_surface": FreeSurface(), "numerics": Numerics(velocity_scheme="taylor")},
         {"numerics": Numerics(velocity_scheme="taylor", kernel="wendland_c2")},
         {"numerics": Numerics(time_step=1e-4)},
         {"output": Output(interval=0.013)},
