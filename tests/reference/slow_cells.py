@@ -1,4 +1,4 @@
-"""One step of the scheme `cells`, 2D plane strain, quads and triangles, slow and plain on purpose.
+"""One step of the scheme `cells` without sharpening, 2D plane strain, quads and triangles, slow and plain on purpose.
 
 Written from docs/method.md, section 8, in loops over cells, corners and nodes; the elastic law is that of
 `slow_step`, and so are its conventions. A corner p of a cell has a gradient G_p v = sum_k v_k (x) g_pk, the mean
@@ -169,8 +169,10 @@ def slow_cells_step(state: dict, model: dict, t: float, dt: float) -> dict:
     x_half = x + h * v_half if moves else x
     L = nodal_gradients(x_half, v_half, model)
     for i in range(len(x)):
-        stress = turned(full(sigma[i]), L[i], dt) if moves else full(sigma[i])
-        stress, eps[i] = relax(stress + dt * elastic(L[i], model), eps[i], dt, model)
+        stress, strained_by = full(sigma[i]), dt * elastic(L[i], model)
+        if moves:  # L is in the axes of the half step
+            stress, strained_by = turned(stress, L[i], dt), turned(strained_by, L[i], h)
+        stress, eps[i] = relax(stress + strained_by, eps[i], dt, model)
         sigma[i] = components(stress)
     x = x + dt * v_half if moves else x
     f = forces(x, x_half, v_half, sigma, L, dt, model)

@@ -32,8 +32,8 @@ def corner_share(sharpening: float) -> float:
     """κ of a grid's cells, with sharpening c (`warpsph.operators.sharpening`).
 
     With the stress of edge nodes taken 1 − κ halves of a cell inside, n cells bend with
-    1 + (2 − 6 (1 − κ) + 6 c)/n² + … of their stiffness. κ = ⅔ − c + c²/5 bends five cells exactly, and four and more
-    within 0.6 %.
+    1 + (2 − 6 (1 − κ) + 6 c)/n² + … of their stiffness. κ = ⅔ − c + c²/5 bends five cells exactly, and
+    four and more within 0.6 %.
     """
     return 2.0 / 3.0 - sharpening + sharpening**2 / 5.0
 
@@ -212,10 +212,14 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
             nodes.velocity_gradient[i] = L
             rate = space.stress.elastic_rate(L, material.lame, material.shear, material.young)
         half, point = nodes.half[i], nodes.point[i]
-        turned = space.phi.stress(point.phi)
+        turned, strained_by = space.phi.stress(point.phi), dt * rate
         if wp.static(moves and d > 1):
-            turned = space.stress.transform(turned, space.algebra.rotation(L, dt))
-        trial = turned + dt * rate
+            # L is in the axes of the half step: half of the turn comes before it, half after. With all before,
+            # stresses lag behind their forces by half a step's turn, and pump energy into a body that spins.
+            half_turn = space.algebra.rotation(L, real(0.5) * dt)
+            turned = space.stress.transform(turned, half_turn * half_turn)
+            strained_by = space.stress.transform(strained_by, half_turn)
+        trial = turned + strained_by
         sigma = trial
         if wp.static(law.flows):
             own = internal()

@@ -2,11 +2,11 @@
 
     K = 1 + C,      (C f)_i = (1/V_i) Σ_T c_T (A_T/n) (f_i − f̄_T),      f̄_T the mean over the corners of cell T.
 
-Forces take K σ in place of σ, and σ is strained by K L in place of L. In the sum over nodes with weights V, K is its
-own adjoint, so Σ V σ : K L is still the power of the forces, in any configuration and with any c_T: momentum,
-angular momentum and energy are kept, and constants are left alone. On a line C is −c δ²/4: with c = ⅔ the mean over
-two corners becomes the interpolation of fourth order, and next to nothing is dispersed. Where soil flows c_T = 0,
-or limit loads rise.
+Forces take K σ in place of σ, and σ is strained by K L in place of L. In the sum over nodes with weights V, K is
+its own adjoint, so Σ V σ : K L is still the power of the forces, in any configuration and with any c_T: momentum,
+angular momentum and energy are kept, and constants are left alone. On a line C is −c δ²/4: with c = ⅔ the mean
+over two corners becomes the interpolation of fourth order, and next to nothing is dispersed. Where soil flows
+c_T = 0, or limit loads rise.
 """
 
 from functools import cache
