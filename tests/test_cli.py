@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from warpsph import *
 
-NUMERICS = {{"courant": 1}}
+NUMERICS = {{"velocity_scheme": "taylor", "courant": 1}}
 PARAMETERS = (
     Parameter("duration", 0.005, "s", "simulated time"),
     Parameter("cells", 10, "-", "number of cells"),

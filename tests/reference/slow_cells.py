@@ -1,4 +1,4 @@
-"""One step of the scheme `cells` without sharpening, 2D plane strain, quads and triangles, slow and plain on purpose.
+"""One step of the scheme `cells`, unsharpened, in plane strain, of quads and triangles: slow and plain on purpose.
 
 Written from docs/method.md, section 8, in loops over cells, corners and nodes; the elastic law is that of
 `slow_step`, and so are its conventions. A corner p of a cell has a gradient G_p v = sum_k v_k (x) g_pk, the mean

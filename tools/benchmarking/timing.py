@@ -54,8 +54,8 @@ def time_steps(simulation: Simulation, seconds: float) -> dict:
 def time_phases(simulation: Simulation) -> dict[str, float]:
     """Share of each kernel in the time of the steps of an interval [-].
 
-    The step is not recorded here, and the device is waited for after every kernel, so the sum is more than the same
-    steps take otherwise.
+    The step is not recorded here, and the device is waited for after every kernel, so the sum is more than the
+    same steps take otherwise.
     """
     stepper, launcher = simulation.stepper, simulation.stepper.body.launcher
     launch, spent, device = launcher.launch, defaultdict(float), simulation.device
