@@ -211,7 +211,7 @@ NAMES = [
         "cells takes no sums over neighbours; leave it out",
     ),
     (lambda: Numerics(smoothing_ratio=0.6), "smoothing_ratio", 0.6, "cells takes no sums over neighbours"),
-    (lambda: Numerics(sharpening=0.7), "sharpening", 0.7, "at least 0.0 and at most 0.6667"),
+    (lambda: Numerics(sharpening=0.8), "sharpening", 0.8, "at least 0.0 and at most 0.7"),
     (lambda: Numerics(velocity_scheme="taylor", sharpening=0.0), "sharpening", 0.0, "taylor knows none"),
     (lambda: Numerics(source_scheme="rk4"), "source_scheme", "'rk4'", "cells takes analytic only"),
     (

@@ -14,7 +14,8 @@ from .smoothing import SmoothingKernel
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
-MOST_SHARPENING = 2.0 / 3.0  # more turns dispersion round, and shortens the stable step
+MOST_SHARPENING = 0.7  # more turns dispersion round, and shortens the stable step
+SHARPENING = 2.0 / 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,9 +33,9 @@ class Numerics:
         smoothing_ratio: smoothing length over spacing h/Δx [-] of sums over neighbours; the kernel's own default
             unless given. None with `cells`.
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
-        sharpening: c of `cells` [-], 0 to 2/3, 2/3 unless given: how far what a mean over a cell's corners takes
-            off short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes
-            longer. None with sums over neighbours.
+        sharpening: c of `cells` [-], 0 to 0.7, 2/3 unless given: how far what a mean over a cell's corners takes off
+            short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer.
+            None with sums over neighbours.
     """
 
     velocity_scheme: str = "cells"
@@ -50,7 +51,7 @@ class Numerics:
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
         if scheme.sums is None:
             self._refuse_what_sums_take()
-            sharpening = MOST_SHARPENING if self.sharpening is None else self.sharpening
+            sharpening = SHARPENING if self.sharpening is None else self.sharpening
             sharpening = number("sharpening", sharpening, at_least=0.0, at_most=MOST_SHARPENING)
             object.__setattr__(self, "sharpening", sharpening)
         else:

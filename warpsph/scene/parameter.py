@@ -112,7 +112,12 @@ def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...
             "smoothing length over spacing h/Δx of these sums; auto is the kernel's own default",
             (),
         ),
-        "sharpening": (None, "-", "of cells, 0 to 2/3 (auto): how far short waves get back what means take", ()),
+        "sharpening": (
+            None,
+            "-",
+            "of cells, 0 to 0.7, auto is 2/3: how far short waves get back what means take",
+            (),
+        ),
         "time_step": (None, "s", "Δt; auto follows from courant and the stiffness of the sources", ()),
     }
     automatic = [name for name, row in standard.items() if row[0] is None]
