@@ -33,9 +33,9 @@ class Numerics:
         smoothing_ratio: smoothing length over spacing h/Δx [-] of sums over neighbours; the kernel's own default
             unless given. None with `cells`.
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
-        sharpening: c of `cells` [-], 0 to 0.7, 2/3 unless given: how far what a mean over a cell's corners takes off
-            short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer.
-            None with sums over neighbours.
+        sharpening: c of `cells` [-], 0 to 0.7, 2/3 unless given: how far what a mean over a cell's corners takes
+            off short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes
+            longer. None with sums over neighbours.
     """
 
     velocity_scheme: str = "cells"
