@@ -309,9 +309,6 @@ def test_what_the_scheme_has_not_is_refused_in_one_line():
     loaded = Scene(**scene, numerics=NUMERICS, conditions=[Fixed(edge("bottom")), Pulled(edge("top"))])
     with pytest.raises(SceneError, match="cells takes no tractions"):
         Simulation(loaded, device="cpu")
-    rk4 = Scene(**scene, numerics=Numerics(velocity_scheme="cells", source_scheme="rk4"))
-    with pytest.raises(SceneError, match="cells takes analytic only"):
-        Simulation(rk4, device="cpu")
 
 
 class Tip:
@@ -382,6 +379,7 @@ def test_elastic_flag_swings_and_comes_back():
 def test_time_step_follows_cells_that_are_pressed():
     """Uniaxial strain to four fifths of the height, slowly: squares become 5 : 4, and Δx is their height.
 
+    A cell's mass and its stiffness stay, so that waves get slower by √(4/5), and a step is √(4/5) of the first.
     It is measured anew every 2 % of strain; waves of the press itself strain by v/c_p = 0.5 %.
     """
     scene = Scene(
@@ -398,4 +396,4 @@ def test_time_step_follows_cells_that_are_pressed():
     start = simulation.time_step_limit
     simulation.run()
     assert simulation.field("position")[:, 1].max() == pytest.approx(0.8, abs=1e-9)
-    assert simulation.time_step_limit / start == pytest.approx(0.8, abs=0.03)
+    assert simulation.time_step_limit / start == pytest.approx(np.sqrt(0.8), abs=0.015)

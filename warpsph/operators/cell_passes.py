@@ -286,9 +286,10 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
     def force(
         first: int,
         material: law.Parameters,
-        wave_speed: real,
+        modulus: real,
         time_step: wp.array(dtype=real),
         corners: wp.array2d(dtype=wp.int32),
+        cell_mass: wp.array(dtype=real),
         nodes: CellNodes,
         numbers: wp.array2d(dtype=real),
         forces: wp.array2d(dtype=types.vector),
@@ -317,8 +318,8 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                 rate_parts[p] += sign[k, p] * rate
         B, volume, frame = shape.measure(x)
         share = real(per_corner) * volume
-        # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² a bound of the cell's own frequencies.
-        stiff = real(n) * wave_speed * wave_speed * wp.trace(shape.spread(B)) / (volume * volume)
+        # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² a bound of the cell's own frequencies, ρ c² its modulus.
+        stiff = real(n) * modulus * wp.trace(shape.spread(B)) / (cell_mass[c] * volume)
         eta = real(0.0)
         if dt > real(0.0):
             eta = wp.min(real(0.5) * dt, real(1.0) / (dt * stiff))
