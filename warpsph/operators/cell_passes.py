@@ -345,8 +345,11 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
         nodes.books[i] = book
         row = held.row[i]
-        if row >= 0 and h > real(0.0):
-            reactions[row] = (mass / h) * (v - free)
+        if row >= 0:
+            if h > real(0.0):
+                reactions[row] = (mass / h) * (v - free)
+            else:  # before the first step: what holds the node back
+                reactions[row] = mass * (held.projector[row] * a - a)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi

@@ -22,7 +22,9 @@ from ..validate import (
 )
 from .code import identity
 from .condition import Condition, Free
+from .face_loads import FaceLoads, face_loads
 from .free_surface import FreeSurface
+from .load import Load
 from .material import Material
 from .numerics import Numerics
 from .output import Output
@@ -131,7 +133,8 @@ class Scene:
         scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
         scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
-        self.output.check(self.mesh, self.duration)
+        self._check_loads()
+        self.output.check(self)
         surface = self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else []
         check_thickness(self.mesh, self.boundary, surface)
         _ = self.initial_velocity, self.initial_stress, self.initial_internals
@@ -140,13 +143,28 @@ class Scene:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
         surface.check(self.mesh.dim)
         for index, condition in enumerate(self.conditions):
-            if isinstance(condition, Free):
-                allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
+            if condition.unmoved:
+                allowed = f"with a free_surface every edge that nobody moves is free; leave {type(condition).__name__} out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
         if not len(surface.candidates(self.mesh, self.conditions)):
             raise SceneError(
                 "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
             )
+
+    def _check_loads(self) -> None:
+        scheme = self.numerics.scheme
+        for index, load in enumerate(self.conditions):
+            if not isinstance(load, Load):
+                continue
+            load.check(self.mesh.dim)
+            load.check_faces(f"conditions[{index}]", self.mesh)
+            if not scheme.nodal_forces and self.large_displacements and (load.turns or not load.follows):
+                allowed = (
+                    f"velocity_scheme {scheme.name} has loads on present areas in directions that stay; take "
+                    "Traction, velocity_scheme cells or large_displacements=False"
+                )
+                raise SceneError(f"conditions[{index}]", load, allowed)
+        _ = self.loads
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -155,13 +173,21 @@ class Scene:
 
     @cached_property
     def boundary(self) -> BoundaryTable:
-        """The conditions, resolved node by node."""
-        if not self.numerics.scheme.unloads:
-            return resolve(self.mesh, self.conditions)
-        conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
-        if self.free_surface is None and bare.faces(self.mesh).any():
+        """The conditions, resolved node by node, without the `loads`."""
+        conditions, mesh, scheme = self.conditions, self.mesh, self.numerics.scheme
+        if scheme.nodal_forces:
+            conditions = tuple(condition for condition in conditions if not isinstance(condition, Load))
+        if not scheme.unloads:
+            return resolve(mesh, conditions, duration=self.duration)
+        bare = Bare(tuple(condition.on for condition in conditions))
+        if self.free_surface is None and bare.faces(mesh).any():
             conditions = (*conditions, Free(bare))
-        return resolve(self.mesh, conditions, self.material.stiffness(self.mesh.continuum))
+        return resolve(mesh, conditions, self.material.stiffness(mesh.continuum), duration=self.duration)
+
+    @cached_property
+    def loads(self) -> FaceLoads:
+        """The loads that are forces on nodes: all of them, or none where the scheme has stresses take them."""
+        return face_loads(self.mesh, self.conditions if self.numerics.scheme.nodal_forces else ())
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:

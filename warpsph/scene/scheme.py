@@ -51,6 +51,8 @@ class Scheme:
             corners; the time step then follows the cells too.
         courant_limit: (number of dimensions, m₂ [-]) → largest stable c_p Δt/Δx.
         largest_support: of a body of so many dimensions, radius over spacing [-].
+        nodal_forces: whether loads are forces on nodes, and what a condition takes up is one; if not, loads are
+            tractions that the stresses of edge nodes are given, see `Condition.tractions`.
         kinds: kinds of cell it can take.
         stepper: makes what advances a scene, a `warpsph.step.step.Stepper`; None for sums over neighbours.
         spacing: mesh → Δx of the Courant number [m].
@@ -64,6 +66,7 @@ class Scheme:
     follows_cells: bool
     courant_limit: Callable[[int, float], float]
     largest_support: Callable[[int], float]
+    nodal_forces: bool = False
     kinds: tuple[CellKind, ...] = tuple(GRID_KINDS.values())
     stepper: Callable | None = None
     spacing: Callable[[Mesh], float] = Mesh.smallest_distance

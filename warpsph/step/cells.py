@@ -21,6 +21,7 @@ from ..operators.cell_passes import (
     stress_kernel,
 )
 from ..operators.cell_shape import cell_shape
+from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
 from ..physics.space import Space
 from ..scene.scene import Scene
@@ -42,6 +43,7 @@ class CellStepper(Stepper):
         body: nodes, cells and material.
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
+        loads: forces on boundary faces, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
 
     Raises:
@@ -49,12 +51,11 @@ class CellStepper(Stepper):
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
-        if scene.boundary.loaded:
-            raise SceneError("conditions", scene.conditions, "velocity_scheme cells takes no tractions")
         if scene.numerics.source_scheme != "analytic":
             allowed = "velocity_scheme cells takes analytic only"
             raise SceneError("source_scheme", scene.numerics.source_scheme, allowed)
-        clock = Clock(scene.body_force, scene.boundary.functions, space, launcher)
+        driven = scene.boundary.functions
+        clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
         self.body = body = CellBody.of(scene, space, launcher)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
         n, moves = len(scene.mesh.nodes), scene.large_displacements
@@ -65,6 +66,7 @@ class CellStepper(Stepper):
         self._forces = wp.zeros((cells, body.kind.corners), dtype=space.types.vector, device=device)
         self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
+        self.loads = LoadedFaces(body, clock, len(driven))
         self._limit = CellLimit(body, clock)
         self._kick = kick_kernel(space, moves)
         self._strain, self._force = strain_kernel(space, body.kind), force_kernel(space, body.kind, body.law)
@@ -72,7 +74,7 @@ class CellStepper(Stepper):
         self._push = push_kernel(space, body.kind, body.slots)
         kernels = (self._kick, self._strain, self._stress, self._force, self._push)
         super().__init__(launcher, clock, parts=(self._limit,))
-        load_kernels([*kernels, *clock.kernels, *self._limit.kernels], device)
+        load_kernels([*kernels, *clock.kernels, *self.loads.kernels, *self._limit.kernels], device)
         self._limit.refresh()
         self.clock.begin([0.0], 0.0)
         self.step()  # of no length: what the initial state asks for, and the accelerations it begins with
@@ -93,6 +95,7 @@ class CellStepper(Stepper):
         launch(self._stress, points, [*inputs, self._numbers, nodes, body.internals, self._limit.outdated, faults])
         inputs = [body.parameters, wave_speed, dt, body.corners, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
+        self.loads.add(self._forces)
         inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         clock.tick()
@@ -114,6 +117,7 @@ CELLS = Scheme(
     follows_cells=True,
     courant_limit=lambda dim, moment: 1.0,
     largest_support=lambda dim: float("inf"),
+    nodal_forces=True,
     kinds=tuple(KINDS.values()),
     stepper=CellStepper,
     spacing=spacing,
