@@ -1,4 +1,4 @@
-"""Tractions that stresses of edge nodes are given, as the published schemes have loads, against exact states and waves."""
+"""Tractions put in place in the stresses of edge nodes, as published schemes have loads: exact states, waves."""
 
 import math
 

@@ -91,7 +91,7 @@ def surface_rule(kind: CellKind) -> tuple[tuple[float, np.ndarray, np.ndarray], 
 
 
 def area_vectors(points: np.ndarray, kind: CellKind) -> np.ndarray:
-    """∂x/∂ξ₁ × ∂x/∂ξ₂ in the middle of faces with corners (f, c, d), shape (f, d), as `surface_rule` counts them."""
+    """∂x/∂ξ₁ × ∂x/∂ξ₂ in the middle of faces with corners (f, c, d), shape (f, d); see `surface_rule`."""
     slopes = sum(weight * slope for weight, _, slope in surface_rule(kind))
     along = np.einsum("fkd,ka->fad", points, slopes)
     if points.shape[2] == 1:
@@ -105,7 +105,7 @@ Term = tuple[np.ndarray, np.ndarray, TimeFunction, bool]
 
 
 def _terms(index: int, condition: Condition, mesh: Mesh) -> list[Term]:
-    """Faces (l,), values at their corners (l, c, d + 1), function of time and whether faces are the present ones."""
+    """Faces (l,), values at their corners (l, c, d + 1), function of time, whether the present faces count."""
     if isinstance(condition, Load):
         condition.check_faces(f"conditions[{index}]", mesh)
         faces = np.flatnonzero(condition.faces(mesh))
@@ -124,7 +124,7 @@ def _terms(index: int, condition: Condition, mesh: Mesh) -> list[Term]:
 def _refuse_contradiction(
     index: int, faces: np.ndarray, values: np.ndarray, mesh: Mesh, conditions: Sequence[Condition]
 ) -> None:
-    """A load must not be along a direction in which one condition moves the face, nor on one that is called free."""
+    """A load must not be along a direction in which one condition moves the face, nor on a face called free."""
     load, covered, normals = conditions[index], np.zeros(len(mesh.faces), dtype=bool), mesh.face_normals()
     covered[faces] = True
     for other, condition in enumerate(conditions):

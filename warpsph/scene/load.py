@@ -1,7 +1,7 @@
 """Loads on boundary faces: tractions and pressures, functions of place times a function of time.
 
 A load acts on the boundary faces whose nodes are all selected, each face on its own nodes. With the scheme `cells`
-it is a force on nodes (`warpsph.scene.face_loads`); the published schemes prescribe the stress of the edge's nodes.
+it is a force on nodes (`warpsph.scene.face_loads`); the published schemes prescribe stresses of the edge's nodes.
 """
 
 from __future__ import annotations

@@ -176,7 +176,7 @@ class Reaction:
         index("Reaction.axis", self.axis)
 
     def check(self, scene: Scene) -> None:
-        """Raise `SceneError` when the mesh has no such axis, no condition moves the nodes, or there are no forces."""
+        """Raise `SceneError` without such an axis, a node that a condition moves, or forces on nodes at all."""
         index("Reaction.axis", self.axis, below=scene.mesh.dim)
         scheme = scene.numerics.scheme
         if not scheme.nodal_forces:

@@ -144,7 +144,8 @@ class Scene:
         surface.check(self.mesh.dim)
         for index, condition in enumerate(self.conditions):
             if condition.unmoved:
-                allowed = f"with a free_surface every edge that nobody moves is free; leave {type(condition).__name__} out"
+                name = type(condition).__name__
+                allowed = f"with a free_surface every edge that nobody moves is free; leave {name} out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
         if not len(surface.candidates(self.mesh, self.conditions)):
             raise SceneError(
