@@ -9,18 +9,26 @@ from warpsph import (
     Box,
     Elastic,
     Fixed,
+    Free,
     Linear,
+    Numerics,
+    Output,
     PrescribedVelocity,
     Pressure,
+    Probe,
     Ramp,
     Reaction,
     Roller,
     Scene,
+    SceneError,
     Simulation,
     Traction,
     edge,
     where,
 )
+from warpsph.errors import FunctionError
+from warpsph.scene.document import decode, encode
+from warpsph.scene.fingerprint import fingerprint
 
 STRESS = {1: (3e3,), 2: (3e3, -1e3, 2e3, 600.0), 3: (3e3, -1e3, 2e3, 500.0, 700.0, -300.0)}  # [Pa], σ33 = ν tr
 SOIL = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=2000.0)
@@ -423,3 +431,141 @@ def test_runs_are_the_same_on_any_number_of_threads_and_after_a_restart(kind, pr
     for name in one.fields():
         assert np.array_equal(one.field(name), resumed.field(name)), name
     assert one.stepper.loads.work.numpy().sum() == resumed.stepper.loads.work.numpy().sum() > 0.0
+
+
+BLOCK = {"shape": Box((1.0, 1.0), 0.25), "material": SOIL, "duration": 1.0, "numerics": NUMERICS}
+TOP = edge("top")
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (lambda: Traction(TOP, "down"), r"^Traction.traction = 'down' .*finite numbers"),
+        (lambda: Traction(TOP, (0.0, np.nan)), r"^Traction.traction = .*finite numbers"),
+        (lambda: Traction(TOP, Ramp(1.0)), r"^Traction.traction = Ramp.*not be a function of time; .*factor"),
+        (lambda: Traction(TOP, (0.0, 1.0), factor="x"), r"^Traction.factor = 'x'"),
+        (lambda: Traction(TOP, (0.0, 1.0), follows=1), r"^Traction.follows = 1 .*True or False"),
+        (
+            lambda: Traction(TOP, (0.0, 1.0), lambda t: 1.0 / t),
+            r"^Traction.factor = .*f\(0.0\) must return a finite",
+        ),
+        (
+            lambda: Pressure(TOP, (1.0,)),
+            r"^Pressure.pressure = \(1.0,\) .*finite number or a function of position",
+        ),
+        (lambda: Pressure(TOP, np.inf), r"^Pressure.pressure = inf"),
+        (lambda: Pressure(TOP, Linear(1.0)), r"^Pressure.pressure = Linear.*not be a function of time; .*factor"),
+        (lambda: Pressure(TOP, 1.0, follows=None), r"^Pressure.follows = None"),
+    ],
+)
+def test_loads_that_can_not_be_are_refused(load, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        load()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "message"),
+    [
+        ([Traction(TOP, (1.0,))], r"^Traction.traction = \(1.0,\) .* 2 components$"),
+        ([Traction(TOP, lambda x, y: (x, y, x))], r"^Traction.traction = .*must return 2 finite"),
+        ([Pressure(TOP, lambda x, y: np.where(x > 0.5, np.inf, x))], r"^Pressure.pressure = .*finite"),
+        ([Pressure(TOP, lambda x: x)], r"^Pressure.pressure = .*must return 1 finite"),
+        (
+            [Pressure(where(lambda x, y: (x == 0.5) & (y == 0.5)), 1.0)],
+            r"^conditions\[0\] = .*all nodes of at least one boundary face$",
+        ),
+        (
+            [Pressure(TOP & where(lambda x, y: x == 0.5), 1.0)],
+            r"^conditions\[0\] = .*all nodes of at least one boundary face$",
+        ),
+        (
+            [Pressure(where(lambda x, y: y >= 0.75), 1.0)],
+            r"^conditions\[0\] = .*node 8 at \(0.25, 0.75\) lies on no boundary face whose nodes are all selected$",
+        ),
+        (
+            [Fixed(TOP), Traction(TOP, (1.0, 0.0))],
+            r"^conditions\[1\] = .*shares 4 boundary face\(s\) with conditions\[0\] .*holds them along the load$",
+        ),
+        (
+            [Traction(TOP, (1.0, -1.0)), PrescribedVelocity(TOP, (None, -1.0))],
+            r"^conditions\[0\] = .*with conditions\[1\] .*moves or holds them along the load$",
+        ),
+        (
+            [Pressure(edge("boundary"), 1.0), Roller(edge("bottom"))],
+            r"^conditions\[0\] = .*shares 4 .*with conditions\[1\] .*moves or holds them along the load$",
+        ),
+        (
+            [Free(TOP), Pressure(TOP, 1.0)],
+            r"^conditions\[1\] = .*with conditions\[0\] .*says that nothing is on them$",
+        ),
+    ],
+)
+def test_loads_that_do_not_fit_the_scene_are_refused(conditions, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        Scene(**BLOCK, conditions=conditions)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (Pressure(TOP, 1.0), "velocity_scheme taylor has loads on present areas in directions that stay"),
+        (Traction(TOP, (1.0, 0.0), follows=False), "velocity_scheme taylor has loads on present areas"),
+        (
+            Traction(where(lambda x, y: y >= 0.75), (1.0, 0.0)),
+            "lies on no boundary face whose nodes are all selected",
+        ),
+    ],
+)
+def test_published_schemes_refuse_what_they_can_not_do(load, message):
+    with pytest.raises(SceneError, match=message):
+        Scene(**BLOCK | {"numerics": Numerics(velocity_scheme="taylor")}, conditions=[load])
+
+
+def test_published_schemes_take_a_pressure_where_nothing_turns():
+    common = BLOCK | {"large_displacements": False, "numerics": Numerics(velocity_scheme="taylor")}
+    one, two = (
+        Scene(**common, conditions=[load]).boundary
+        for load in (Pressure(TOP, 7.0), Traction(TOP, (0.0, -7.0), follows=False))
+    )
+    assert np.array_equal(one.traction, two.traction) and one.loaded
+
+
+def test_a_load_that_is_not_finite_later_ends_the_run_in_one_line():
+    wild = Traction(TOP, (0.0, 1.0), lambda t: np.nan if t > 0.01 else 1.0)
+    simulation = Simulation(Scene(**BLOCK, conditions=[Fixed(edge("bottom")), wild]), device="cpu")
+    with pytest.raises(FunctionError, match=r"^Traction.factor = .*must return a finite number; not nan$"):
+        simulation.run()
+
+
+class Suction(Free):
+    """A condition of one's own, as docs/conditions.md says: it pulls along the normal."""
+
+    def tractions(self, points, normal):
+        return [(np.broadcast_to(1e3 * normal, points.shape), 1.0)]
+
+
+def test_tractions_of_ones_own_are_forces_too():
+    stress = {"stress": lambda x, y: (1e3, 1e3, 0.0, 1e3)}
+    simulation = Simulation(Scene(**BLOCK | stress, conditions=[Suction(edge("boundary"))]), device="cpu")
+    for _ in range(20):
+        simulation.step()
+    assert np.abs(simulation.field("velocity")).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["Traction", "Pressure"])
+def test_loads_are_stored_and_read_again(name):
+    loads = {
+        "Traction": Traction(TOP, (0.0, -1e3), Ramp(0.5), follows=False),
+        "Pressure": Pressure(edge("left"), 1e3, Linear(2.0)),
+    }
+    probe = Probe("base", "N/m", Reaction(edge("bottom"), 1))
+    scene = Scene(**BLOCK, conditions=[Fixed(edge("bottom")), loads[name]], output=Output(probes=(probe,)))
+    document, arrays = encode(scene)
+    again = decode(document, arrays)
+    assert again.conditions[1] == loads[name]
+    assert again.output.probes == (probe,)
+    assert fingerprint(again) == fingerprint(scene)
+    bare = Scene(**BLOCK, conditions=[Fixed(edge("bottom"))], output=scene.output)
+    assert fingerprint(bare) != fingerprint(scene)

@@ -26,7 +26,6 @@ from .held import held_types
 # 1 + (2 − 6 (1 − κ))/n² of their stiffness. Two thirds leave no error of second order.
 CORNER_SHARE = 2.0 / 3.0
 MOST_STRAIN = 0.02  # between two looks at the time step
-LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
 def numbers_of(space: Space, shape: CellShape) -> int:

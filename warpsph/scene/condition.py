@@ -46,6 +46,11 @@ class Condition:
         """Whether it prescribes tractions only, and leaves where nodes go to others."""
         return False
 
+    @property
+    def rigid(self) -> bool:
+        """Whether its nodes move as one rigid body does."""
+        return False
+
     def nodes(self, mesh: Mesh) -> np.ndarray:
         """Which nodes the condition holds at, boolean, shape (n,)."""
         return self.on.nodes(mesh)
@@ -82,6 +87,10 @@ class Condition:
 @dataclass(frozen=True)
 class Fixed(Condition):
     """No motion: v = 0."""
+
+    @property
+    def rigid(self):
+        return True
 
     def rows(self, points, normal):
         return [(_axis(points, axis), []) for axis in range(points.shape[1])]
@@ -143,7 +152,10 @@ class PrescribedVelocity(Condition):
             speed = time_function("PrescribedVelocity.velocity", self.velocity)
             object.__setattr__(self, "velocity", speed)
             return
-        allowed = "it must be a sequence of numbers, functions of time or None, one an axis, not all None"
+        allowed = (
+            "it must be a sequence of numbers, functions of time or None, one an axis, not all None; "
+            "a single one needs along"
+        )
         try:
             velocity = tuple(self.velocity)
         except TypeError:
@@ -158,6 +170,10 @@ class PrescribedVelocity(Condition):
                 for value in velocity
             ),
         )
+
+    @property
+    def rigid(self):
+        return self.along is None and None not in self.velocity
 
     def rows(self, points, normal):
         one = np.ones(len(points))
@@ -186,6 +202,10 @@ class Rotating(Condition):
 
     angular_velocity: float = 0.0
     centre: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def rigid(self):
+        return True
 
     def __post_init__(self):
         super().__post_init__()

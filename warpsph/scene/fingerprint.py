@@ -36,6 +36,7 @@ def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
     mesh, output = scene.mesh, scene.output
     times = np.linspace(0.0, scene.duration, SAMPLES).tolist()
     yield from (("nodes", mesh.nodes), ("cells", mesh.cells), ("faces", mesh.faces))
+    yield "rigid_cells", scene.rigid_cells
     for name in ("boundary", "loads"):
         table = getattr(scene, name)
         for entry in fields(table):

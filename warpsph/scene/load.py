@@ -55,7 +55,7 @@ class Load(Condition):
 
     def check_faces(self, field: str, mesh: Mesh) -> None:
         """Raise `SceneError` when a selected node lies on no boundary face that is selected as a whole."""
-        faces, nodes = self.faces(mesh), self.on.nodes(mesh)
+        faces, nodes = self.faces(mesh), self.on.nodes(mesh).copy()
         if not faces.any():
             raise SceneError(field, self, "it must hold all nodes of at least one boundary face")
         nodes[mesh.faces[faces]] = False

@@ -186,6 +186,15 @@ class Scene:
         return resolve(mesh, conditions, self.material.stiffness(mesh.continuum), duration=self.duration)
 
     @cached_property
+    def rigid_cells(self) -> np.ndarray:
+        """Cells that no motion strains, since one condition moves all of their corners rigidly; boolean (m,)."""
+        rigid = np.zeros(len(self.mesh.cells), dtype=bool)
+        for condition in self.conditions:
+            if condition.rigid:
+                rigid |= condition.nodes(self.mesh)[self.mesh.cells].all(axis=1)
+        return rigid
+
+    @cached_property
     def loads(self) -> FaceLoads:
         """The loads that are forces on nodes: all of them, or none where the scheme has stresses take them."""
         return face_loads(self.mesh, self.conditions if self.numerics.scheme.nodal_forces else ())

@@ -10,10 +10,11 @@ from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.scene import Scene
 from .body import Body, shared_parts
-from .cells import cell_table
+from .cells import NodeCells, cell_table, node_cells
 
 # Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
 FORCES, CONDITIONS, FLOW = 0, 1, 2
+LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
 @cache
@@ -54,9 +55,14 @@ class CellBody(Body):
             all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
             `strained` ∫ |d| dt since the step was last measured.
         corners: node indices of each cell, shape (m, c).
+        straining: the cells around each node that its volume and strain rate are of: `node_cells` without those
+            that conditions move rigidly, so that a clamp inside a body is as stiff as one at its edge.
+        share: of each node's initial volume that is of such cells [-], shape (n,), or 1.
     """
 
     corners: wp.array
+    straining: NodeCells
+    share: np.ndarray | float
 
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> "CellBody":
@@ -83,8 +89,15 @@ class CellBody(Body):
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
         corners = cell_table(mesh, mesh.kind, device)
-        return CellBody(nodes=nodes, auxiliary=None, corners=corners, **shared_parts(scene, space, launcher))
+        shared, rigid = shared_parts(scene, space, launcher), scene.rigid_cells
+        straining, share = shared["node_cells"], 1.0
+        if rigid.any():
+            straining = node_cells(mesh, shared["slots"], device, without=rigid)
+            parts = np.repeat(np.where(rigid, 0.0, mesh.cell_volumes()), mesh.kind.corners)
+            share = np.bincount(mesh.cells.ravel(), parts, n) / (mesh.kind.corners * volume)
+            share = np.maximum(share, LEAST_VOLUME)
+        return CellBody(nodes=nodes, auxiliary=None, corners=corners, straining=straining, share=share, **shared)
 
     def density(self) -> np.ndarray:
-        """ρ = m/V of the nodes [kg/mᵈ], shape (n,)."""
-        return self.nodes.mass.numpy() / self.nodes.volume.numpy()
+        """ρ of the nodes [kg/mᵈ], shape (n,): mass over volume of the cells around them that strain."""
+        return self.share * self.nodes.mass.numpy() / self.nodes.volume.numpy()

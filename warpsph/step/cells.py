@@ -12,7 +12,6 @@ from ..mesh.kinds import KINDS
 from ..mesh.mesh import Mesh
 from ..operators.cell_limit import CellLimit
 from ..operators.cell_passes import (
-    LEAST_VOLUME,
     force_kernel,
     kick_kernel,
     numbers_of,
@@ -26,7 +25,7 @@ from ..operators.held import held_table
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
-from ..state.cell_body import CellBody
+from ..state.cell_body import LEAST_VOLUME, CellBody
 from ..state.clock import Clock
 from .step import Stepper
 
@@ -91,7 +90,7 @@ class CellStepper(Stepper):
         damping, wave_speed = body.scene.damping, body.scene.material.wave_speed(body.space.dim)
         launch(self._kick, points, [self.conditions, damping, dt, nodes], gathers=False)
         launch(self._strain, body.corners, [body.corners, nodes, self._numbers, faults])
-        inputs = [body.parameters, LEAST_VOLUME / body.scene.material.density, dt, body.node_cells]
+        inputs = [body.parameters, LEAST_VOLUME / body.scene.material.density, dt, body.straining]
         launch(self._stress, points, [*inputs, self._numbers, nodes, body.internals, self._limit.outdated, faults])
         inputs = [body.parameters, wave_speed, dt, body.corners, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
