@@ -54,16 +54,15 @@ class Load(Condition):
         raise NotImplementedError
 
     def check_faces(self, field: str, mesh: Mesh) -> None:
-        """Raise `SceneError` when a selected node lies on no boundary face that is selected as a whole."""
-        faces, nodes = self.faces(mesh), self.on.nodes(mesh).copy()
-        if not faces.any():
+        """Raise `SceneError` when it selects nodes inside the body, or of no boundary face all nodes."""
+        if not self.faces(mesh).any():
             raise SceneError(field, self, "it must hold all nodes of at least one boundary face")
-        nodes[mesh.faces[faces]] = False
-        if nodes.any():
-            node = int(nodes.argmax())
+        inside = self.on.nodes(mesh).copy()
+        inside[mesh.faces[self.on.faces(mesh)]] = False
+        if inside.any():
+            node = int(inside.argmax())
             at = tuple(mesh.nodes[node].tolist())
-            allowed = f"node {node} at {at} lies on no boundary face whose nodes are all selected"
-            raise SceneError(field, self, allowed)
+            raise SceneError(field, self, f"node {node} at {at} lies on no boundary face, which alone are loaded")
 
 
 @dataclass(frozen=True)
