@@ -1,5 +1,6 @@
 """A rough circular footing on clay, a quarter in space: the bearing capacity by the reaction it takes up."""
 
+import itertools
 import math
 
 import numpy as np
@@ -55,7 +56,7 @@ def quarter(n):
         list(rings(lambda t: core(1.0 - t, 1.0), 0.25 * math.pi)),
     ):
         rows = [[node(point) for point in row] for row in block]
-        for low, high in zip(rows, rows[1:], strict=False):
+        for low, high in itertools.pairwise(rows):
             cells += zip(low, low[1:], high[1:], high, strict=False)
     return np.array(points), np.array(cells)
 

@@ -14,6 +14,7 @@ from .smoothing import SmoothingKernel
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
+MOST_SHARPENING = 2.0 / 3.0  # more turns dispersion round, and shortens the stable step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +32,8 @@ class Numerics:
             `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
+        sharpening: c of `cells` [-], 0 to 2/3: how far what a mean over a cell's corners takes off short waves is
+            put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer.
     """
 
     kernel: str = "gaussian"
@@ -39,6 +42,7 @@ class Numerics:
     velocity_scheme: str = "compatible"
     source_scheme: str = "analytic"
     time_step: float | None = None
+    sharpening: float = MOST_SHARPENING
 
     def __post_init__(self):
         choice("kernel", self.kernel, KERNELS)
@@ -49,6 +53,8 @@ class Numerics:
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
         if self.time_step is not None:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
+        sharpening = number("sharpening", self.sharpening, at_least=0.0, at_most=MOST_SHARPENING)
+        object.__setattr__(self, "sharpening", sharpening)
 
     @property
     def smoothing(self) -> SmoothingKernel:

@@ -45,7 +45,7 @@ def _phi(simulation) -> np.ndarray:
 
 
 def _stress(simulation) -> np.ndarray:
-    return _phi(simulation)[:, simulation.mesh.dim :].copy()
+    return simulation.stepper.body.stress()
 
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:

@@ -50,6 +50,10 @@ class Body:
         """ρ of the nodes [kg/mᵈ], shape (n,)."""
         return self.nodes.density.numpy().copy()
 
+    def stress(self) -> np.ndarray:
+        """σ of the nodes [Pa], stored components, shape (n, s)."""
+        return self.nodes.point.numpy()["phi"][:, self.space.dim :].copy()
+
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
         """The body of a scene in its initial state; auxiliary nodes are still to be centred."""

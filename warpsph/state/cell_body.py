@@ -40,6 +40,8 @@ def cell_node_types(space: Space) -> tuple[type, type]:
         acceleration: wp.array(dtype=types.vector)
         books: wp.array(dtype=wp.vec3d)
         strained: wp.array(dtype=space.real)
+        sharpened: wp.array(dtype=types.stress)
+        flowed: wp.array(dtype=space.real)
 
     return Half, CellNodes
 
@@ -53,7 +55,8 @@ class CellBody(Body):
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
             all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
-            `strained` ∫ |d| dt since the step was last measured.
+            `strained` ∫ |d| dt since the step was last measured; `sharpened` K σ [Pa], where it is asked for;
+            `flowed` of a law that flows, 1 in a step in which it does, then less and less.
         corners: node indices of each cell, shape (m, c).
         straining: the cells around each node that its volume and strain rate are of: `node_cells` without those
             that conditions move rigidly, so that a clamp inside a body is as stiff as one at its edge.
@@ -65,8 +68,8 @@ class CellBody(Body):
     share: np.ndarray | float
 
     @staticmethod
-    def of(scene: Scene, space: Space, launcher: Launcher) -> "CellBody":
-        """The body of a scene in its initial state."""
+    def of(scene: Scene, space: Space, launcher: Launcher, *, sharp: bool) -> "CellBody":
+        """The body of a scene in its initial state; `sharp` if stresses are to be sharpened."""
         mesh, device, types = scene.mesh, launcher.device, space.types
         Half, CellNodes = cell_node_types(space)
         n, x, nodes = len(mesh.nodes), mesh.nodes - mesh.middle, CellNodes()
@@ -88,9 +91,11 @@ class CellBody(Body):
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
+        shared = shared_parts(scene, space, launcher)
+        nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
+        nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)
         corners = cell_table(mesh, mesh.kind, device)
-        shared, rigid = shared_parts(scene, space, launcher), scene.rigid_cells
-        straining, share = shared["node_cells"], 1.0
+        rigid, straining, share = scene.rigid_cells, shared["node_cells"], 1.0
         if rigid.any():
             straining = node_cells(mesh, shared["slots"], device, without=rigid)
             parts = np.repeat(np.where(rigid, 0.0, mesh.cell_volumes()), mesh.kind.corners)
@@ -101,3 +106,8 @@ class CellBody(Body):
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,): mass over volume of the cells around them that strain."""
         return self.share * self.nodes.mass.numpy() / self.nodes.volume.numpy()
+
+    def stress(self) -> np.ndarray:
+        """The stress that forces come from [Pa], sharpened if any is, stored components, shape (n, s)."""
+        sharp = len(self.nodes.sharpened) == len(self.nodes.point)
+        return self.nodes.sharpened.numpy().copy() if sharp else super().stress()
