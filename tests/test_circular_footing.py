@@ -73,10 +73,11 @@ def quarter_cylinder():
 
 
 def test_bearing_capacity_of_a_rough_circular_footing():
-    """6.05 s_u for Tresca (Cox, Eason and Hopkins 1961), and the base carries it.
+    """Nc = 6.05 for Tresca (Cox, Eason and Hopkins 1961), and the base carries the load.
 
-    Von Mises with the same strength in plane strain is weaker elsewhere, by up to 13 %, and cells of a tenth of
-    the radius are too strong: with cells of 0.03 at the edge the load is 0.945 of that, with a smooth footing 0.91.
+    Von Mises with the strength s_u in plane strain is nowhere stronger than Tresca with s_u, and nowhere weaker
+    than Tresca with √3/2 of it: so is its load. With cells of 0.03 at the edge it is 0.945 of 6.05 s_u, 0.91
+    under a smooth footing (5.69, or 0.94, for Tresca).
     """
     footing = edge("top") & where(lambda x, y, z: x**2 + y**2 <= 1.0 + 1e-6)
     scene = Scene(
@@ -110,6 +111,6 @@ def test_bearing_capacity_of_a_rough_circular_footing():
     simulation.run(observers=[Late()])
     load, base, by_stress = np.mean(rows, axis=0)
     exact = 6.05 * STRENGTH * math.pi / 4.0
-    assert load == pytest.approx(exact, rel=0.03)
+    assert math.sqrt(0.75) * exact <= load <= 1.03 * exact
     assert base == pytest.approx(-load, rel=0.003)
     assert by_stress == pytest.approx(load, rel=0.05)

@@ -166,7 +166,7 @@ def test_reactions_balance_weight_and_loads(kind):
         return tuple(part + inner * 0.06 * rng.uniform(-1.0, 1.0, np.shape(part)) for part in x)
 
     held = run(
-        6.0,
+        15.0,
         shape=Box((1.0,) * dim, 0.25, cells=BODIES[kind][1]).mapped(moved),
         conditions=[Fixed(edge(base)), Fixed(footing) if dim == 1 else Roller(footing), *beside],
         body_force=BodyForce(tuple(np.eye(dim)[axis] * -9.81)),
