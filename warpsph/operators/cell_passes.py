@@ -4,6 +4,9 @@ A node's corner of a cell, the pair p = (T, i), is a point of the quadrature: it
 G_p, taken a share κ of the way to the corner, and the stress of the node. L_i = (1/V_i) Σ_p w_p G_p v, and the
 nodal force is its exact adjoint. What L does not see, G_p v − L_i, all the way to the corner, is rough: it meets a
 viscosity, no smooth motion does.
+
+Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening of
+a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow.
 """
 
 from functools import cache
@@ -23,7 +26,7 @@ from .conditions import MOST_A_STEP
 from .held import held_types
 from .sharpening import around, sharp_types
 
-CALMING = 0.9  # a step: how fast a node that has flowed is taken for elastic again
+CALMING = 0.9  # a step: how fast a node that has flowed is taken for an elastic one again
 MOST_STRAIN = 0.02  # between two looks at the time step
 
 
@@ -31,15 +34,15 @@ def corner_share(sharpening: float) -> float:
     """κ of a grid's cells, with sharpening c (`warpsph.operators.sharpening`).
 
     With the stress of edge nodes taken 1 − κ halves of a cell inside, n cells bend with
-    1 + (2 − 6 (1 − κ) + 6 c)/n² + … of their stiffness. κ = ⅔ − c + c²/5 bends five cells exactly, and
-    four and more within 0.6 %.
+    1 + (2 − 6 (1 − κ) + 6 c)/n² + … of their stiffness. κ = ⅔ − c + c²/5 bends five cells exactly, and four and
+    more within 0.6 %.
     """
     return 2.0 / 3.0 - sharpening + sharpening**2 / 5.0
 
 
 def numbers_of(space: Space, shape: CellShape) -> int:
-    """How many numbers the strain pass leaves of a cell: A/n, (A/n) G v, and the part of each mode of it."""
-    return 1 + space.dim**2 * (1 + shape.partial)
+    """How many numbers the strain pass leaves of a cell: A/n, e_T, (A/n) G v, and the part of each mode of it."""
+    return 2 + space.dim**2 * (1 + shape.partial)
 
 
 @cache
@@ -52,14 +55,14 @@ def _tensors(space: Space) -> tuple[wp.Function, wp.Function]:
         result = tensor()
         for a in range(wp.static(d)):
             for b in range(wp.static(d)):
-                result[a, b] = numbers[c, 1 + d * d * which + d * a + b]
+                result[a, b] = numbers[c, 2 + d * d * which + d * a + b]
         return result
 
     @wp.func
     def put_tensor(c: int, which: int, value: tensor, numbers: wp.array2d(dtype=real)):
         for a in range(wp.static(d)):
             for b in range(wp.static(d)):
-                numbers[c, 1 + d * d * which + d * a + b] = value[a, b]
+                numbers[c, 2 + d * d * which + d * a + b] = value[a, b]
 
     return tensor_at, put_tensor
 
@@ -92,8 +95,8 @@ def kick_kernel(space: Space, moves: bool):
 
 
 @cache
-def strain_kernel(space: Space, kind: CellKind):
-    """Of each cell, at the half step: A/n, (A/n) G v, and what its hourglass modes add to it."""
+def strain_kernel(space: Space, kind: CellKind, flows: bool):
+    """Of each cell, at the half step: A/n, e_T, (A/n) G v, and what its hourglass modes add to it."""
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     per_corner, T, (_, put_tensor) = 1.0 / kind.corners, shape.weights, _tensors(space)
@@ -112,10 +115,12 @@ def strain_kernel(space: Space, kind: CellKind):
         packed_nodes(nodes)
         packed_table(corners)
         packed_numbers(numbers)
-        x, v = shape.Modes(), shape.Modes()
+        x, v, flowed = shape.Modes(), shape.Modes(), real(0.0)
         for k in range(wp.static(kind.corners)):
             i = corners[c, k]
             half = nodes.half[i]
+            if wp.static(flows):
+                flowed = wp.max(flowed, nodes.flowed[i])
             x += wp.outer(T[k], half.x)
             v += wp.outer(T[k], half.v)
         B, volume, frame = shape.measure(x)
@@ -124,6 +129,7 @@ def strain_kernel(space: Space, kind: CellKind):
         share = real(per_corner) * volume
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
+        numbers[c, 1] = real(1.0) - flowed
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             G = weighted / share
@@ -149,8 +155,10 @@ def rate_kernel(space: Space, kind: CellKind, slots: bool, corner_share: float):
     @wp.func
     def corner_gradient(c: int, k: int, numbers: wp.array2d(dtype=real)):
         g = tensor_at(c, 0, numbers)
-        for p in range(wp.static(shape.partial)):
-            g += (real(corner_share) * sign[k, p]) * tensor_at(c, 1 + p, numbers)
+        if wp.static(shape.partial > 0):
+            share = real(corner_share) * numbers[c, 1]
+            for p in range(wp.static(shape.partial)):
+                g += (share * sign[k, p]) * tensor_at(c, 1 + p, numbers)
         return g
 
     @forward_kernel
@@ -314,12 +322,12 @@ def force_kernel(space: Space, kind: CellKind, law: Law, *, corner_share: float,
         # τ : G v, since Dₑ : G v is at hand.
         power = volume * space.stress.complementary(tau, whole, material.lame, material.shear, material.young)
         if wp.static(shape.partial > 0):
-            W = Parts()
+            W, towards = Parts(), real(corner_share) * numbers[c, 1]
             for p in range(wp.static(shape.partial)):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
-                W[p] = real(corner_share) * stress_parts[p] + rough
+                W[p] = towards * stress_parts[p] + rough
                 power += share * space.stress.complementary(
                     rough, part, material.lame, material.shear, material.young
                 )

@@ -6,7 +6,7 @@ Forces take K σ in place of σ, and σ is strained by K L in place of L. In the
 its own adjoint, so Σ V σ : K L is still the power of the forces, in any configuration and with any c_T: momentum,
 angular momentum and energy are kept, and constants are left alone. On a line C is −c δ²/4: with c = ⅔ the mean
 over two corners becomes the interpolation of fourth order, and next to nothing is dispersed. Where soil flows
-c_T = 0, or limit loads rise.
+c_T = c e_T is 0, or limit loads rise.
 """
 
 from functools import cache
@@ -36,7 +36,7 @@ def sharp_types(space: Space) -> type:
 
 
 @cache
-def rate_mean_kernel(space: Space, kind: CellKind, flows: bool):
+def rate_mean_kernel(space: Space, kind: CellKind):
     """c_T A_T/n of each cell, and that times the mean of L over its corners."""
     real, CellNodes, Means = space.real, cell_node_types(space)[1], sharp_types(space)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
@@ -55,13 +55,10 @@ def rate_mean_kernel(space: Space, kind: CellKind, flows: bool):
         packed_nodes(nodes)
         packed_table(corners)
         packed_means(means)
-        mean, flowed = space.types.tensor(), real(0.0)
+        mean = space.types.tensor()
         for k in range(wp.static(kind.corners)):
-            i = corners[c, k]
-            mean += nodes.velocity_gradient[i]
-            if wp.static(flows):
-                flowed = wp.max(flowed, nodes.flowed[i])
-        weight = sharpening * (real(1.0) - flowed) * numbers[c, 0]
+            mean += nodes.velocity_gradient[corners[c, k]]
+        weight = sharpening * numbers[c, 1] * numbers[c, 0]
         means.weight[c] = weight
         means.rate[c] = (real(per_corner) * weight) * mean
 

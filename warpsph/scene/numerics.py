@@ -14,7 +14,7 @@ from .smoothing import SmoothingKernel
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
-MOST_SHARPENING = 2.0 / 3.0  # more turns dispersion round, and shortens the stable step
+MOST_SHARPENING = 0.7  # more turns dispersion round, and shortens the stable step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Numerics:
             `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
-        sharpening: c of `cells` [-], 0 to 2/3: how far what a mean over a cell's corners takes off short waves is
+        sharpening: c of `cells` [-], 0 to 0.7: how far what a mean over a cell's corners takes off short waves is
             put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer.
     """
 
@@ -42,7 +42,7 @@ class Numerics:
     velocity_scheme: str = "compatible"
     source_scheme: str = "analytic"
     time_step: float | None = None
-    sharpening: float = MOST_SHARPENING
+    sharpening: float = 2.0 / 3.0
 
     def __post_init__(self):
         choice("kernel", self.kernel, KERNELS)
