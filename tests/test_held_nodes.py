@@ -27,6 +27,7 @@ from warpsph import (
     edge,
     where,
 )
+from warpsph.scene.document import decode, encode
 
 SOIL = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=2000.0)
 
@@ -239,3 +240,10 @@ def test_reactions_that_there_are_not_are_refused(probe, more, message):
             }
             | more
         )
+
+
+def test_velocities_along_a_direction_are_stored_and_read_again():
+    leaning = PrescribedVelocity(edge("top"), Linear(-2.0), along=(3.0, 4.0))
+    scene = Scene(shape=Box((1.0, 1.0), 0.5), material=SOIL, conditions=[leaning], duration=1.0, numerics=NUMERICS)
+    assert leaning.along == (0.6, 0.8)
+    assert decode(*encode(scene)).conditions == (leaning,)
