@@ -160,8 +160,8 @@ class Reaction:
 
     It is exact: at rest the reactions of all conditions, the loads and the weight add up to nothing. As that of
     `EdgeForce` it is positive along +y on a top that is pressed; a base that carries a body gives minus its
-    weight. [N] in 3D, [N/m] in plane strain. Beside the last node of a rigid footing it is high by what acts on
-    the next quarter to half of a cell.
+    weight. [N] in 3D, [N/m] in plane strain. Beside the last node of a rigid footing a part of
+    first order is too much: it moves what is beside it as well.
 
     Args:
         on: the nodes; those that no condition moves add nothing.

@@ -1,4 +1,4 @@
-"""A rough circular footing on clay, a quarter in space: the bearing capacity by the reaction it takes up."""
+"""Limit loads by what a footing takes up: of a vertical cut, and of a rough circular footing in space."""
 
 import itertools
 import math
@@ -8,6 +8,7 @@ import pytest
 
 from tests.test_conjugate_cells import NUMERICS
 from warpsph import (
+    Box,
     EdgeForce,
     Fixed,
     GivenMesh,
@@ -114,3 +115,44 @@ def test_bearing_capacity_of_a_rough_circular_footing():
     assert math.sqrt(0.75) * exact <= load <= 1.03 * exact
     assert base == pytest.approx(-load, rel=0.003)
     assert by_stress == pytest.approx(load, rel=0.05)
+
+
+def test_reaction_on_a_cut_is_high_by_half_a_cell_and_converges():
+    """2 b Y/√3 exactly, by a band at 45° (examples/vertical_cut.py). Its last node presses on what is beside it too.
+
+    The trapezium of stresses ends at that node: it has no such part, and no balance either.
+    """
+    footing, half = edge("top") & where(lambda x, y: x >= 5.0), 5.0
+    excess = []
+    for spacing in (0.5, 0.25):
+        scene = Scene(
+            shape=Box((10.0, 10.0), spacing),
+            material=PerzynaVonMises(
+                young_modulus=1e5, poisson_ratio=0.35, density=2000.0, fluidity=2.0, yield_size=200.0
+            ),
+            conditions=[
+                Roller(edge("left")),
+                Fixed(edge("bottom")),
+                PrescribedVelocity(footing, (None, Linear(-3e-5))),
+                Roller(edge("top") & where(lambda x, y: x < 5.0)),
+            ],
+            duration=math.sqrt(2.0 * 0.15 / 3e-5),
+            numerics=NUMERICS,
+        )
+        simulation, rows = Simulation(scene, device="cpu"), []
+        nodes, by_reaction, by_stress = footing.nodes(scene.mesh), Reaction(footing, 1), EdgeForce(footing, 1)
+
+        class Formed:
+            next_time = math.sqrt(2.0 * 0.05 / 3e-5)
+
+            def observe(self, simulation):
+                if simulation.time >= Formed.next_time:
+                    width = np.ptp(simulation.field("position")[nodes, 0])
+                    rows.append(np.array([by_reaction(simulation), by_stress(simulation)]) * half / width)
+                    self.next_time = simulation.time + 0.5
+
+        simulation.run(observers=[Formed()])
+        reaction, stress = np.mean(rows, axis=0) / (2.0 * half * 200.0 / math.sqrt(3.0)) - 1.0
+        assert abs(stress) <= 0.04 * spacing
+        excess.append(reaction * half / spacing)
+    assert excess == pytest.approx([0.57, 0.57], abs=0.06)
