@@ -15,9 +15,9 @@ from ..device.compiling import forward_kernel
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cell_body import CONDITIONS, FLOW, FORCES, cell_node_types
+from ..state.cell_body import CONDITIONS, DAMPING, ELASTIC, FLOW, FORCES, cell_node_types
 from ..state.cells import NodeCells, cell_in_slot, corner_place
-from ..state.clock import END, FOLDED, HALF, NON_FINITE, TOO_FAST
+from ..state.clock import END, FOLDED, HALF, NON_FINITE, STAGES, TOO_FAST
 from .cell_shape import CellShape, cell_shape
 from .conditions import MOST_A_STEP
 from .held import held_types
@@ -68,17 +68,22 @@ def kick_kernel(space: Space, moves: bool):
         packed_nodes(nodes)
         h = real(0.5) * time_step[0]
         point = nodes.point[i]
-        pushed = space.phi.velocity(point.phi) + h * nodes.acceleration[i]
-        free = wp.exp(-damping * h) * pushed
+        start = space.phi.velocity(point.phi)
+        last = start - nodes.half[i].v
+        free = wp.exp(-damping * h) * (start + h * nodes.acceleration[i])
         v = hold(i, free, HALF, held)
         nodes.half[i].v = v
         if wp.static(moves):
             nodes.half[i].x = point.x + h * v
         else:
             nodes.half[i].x = point.x
-        book = nodes.books[i]
-        book[CONDITIONS] += wp.float64(nodes.mass[i] * wp.dot(v - free, v))
-        nodes.books[i] = book
+        if held.row[i] >= 0:  # what holds it pushes before the damping, and takes its jumps
+            jumps = real(0.5) * (wp.length_sq(last) - wp.length_sq(v - start))
+            book = nodes.books[i]
+            book[CONDITIONS] += wp.float64(
+                nodes.mass[i] * (wp.exp(damping * h) * wp.dot(v - free, v) + jumps)
+            )
+            nodes.books[i] = book
 
     return kick
 
@@ -179,11 +184,12 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
         L = weighted / volume
         rate = space.stress.elastic_rate(L, material.lame, material.shear, material.young)
         half, point = nodes.half[i], nodes.point[i]
-        turned = space.phi.stress(point.phi)
-        if wp.static(moves and d > 1):
-            turned = space.stress.transform(turned, space.algebra.rotation(L, dt))
+        turned, Q = space.phi.stress(point.phi), types.tensor()
+        if wp.static(moves and d > 1):  # half of the turn before, half after: L is that of the half step
+            Q = space.algebra.rotation(L, real(0.5) * dt)
+            turned = space.stress.transform(turned, Q)
         trial = turned + dt * rate
-        sigma = trial
+        sigma, book = trial, nodes.books[i]
         if wp.static(law.flows):
             own = internal()
             if wp.static(remembers):
@@ -191,11 +197,17 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
             sigma, own = law.relax(trial, own, material, dt)
             if wp.static(remembers):
                 internals[i] = own
-            mean, lost = real(0.5) * (turned + sigma), trial - sigma
-            work = space.stress.complementary(mean, lost, material.lame, material.shear, material.young)
-            book = nodes.books[i]
-            book[FLOW] += wp.float64(volume * work)
-            nodes.books[i] = book
+            lost = space.stress.complementary(
+                turned + sigma, trial - sigma, material.lame, material.shear, material.young
+            )
+            book[FLOW] += wp.float64(real(0.5) * volume * lost)
+        kept = space.stress.complementary(
+            turned + sigma, sigma - turned, material.lame, material.shear, material.young
+        )
+        book[ELASTIC] += wp.float64(real(0.5) * volume * kept)
+        nodes.books[i] = book
+        if wp.static(moves and d > 1):
+            sigma = space.stress.transform(sigma, Q)
         u = nodes.displacement[i] + dt * half.v
         nodes.displacement[i] = u
         if wp.static(moves):
@@ -243,7 +255,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
         packed_table(corners)
         packed_numbers(numbers)
         packed_forces(forces)
-        x, dt = shape.Modes(), time_step[0]
+        x, v, dt = shape.Modes(), shape.Modes(), time_step[0]
         mean, mean_rate = types.stress(), types.stress()
         stress_parts, rate_parts = Parts(), Parts()
         for k in range(wp.static(n)):
@@ -252,6 +264,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
             rate = nodes.elastic_rate[i]
             sigma = space.phi.stress(point.phi)
             x += wp.outer(T[k], point.x)
+            v += wp.outer(T[k], space.phi.velocity(point.phi))  # of tⁿ: the push comes after
             mean += sigma
             mean_rate += rate
             for p in range(wp.static(shape.partial)):
@@ -269,21 +282,19 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
         whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
         tau = eta * (whole - real(per_corner) * mean_rate)
         S = real(per_corner) * mean + tau
-        F = shape.Modes()
+        F, power = shape.Modes(), real(0.0)
         for m in range(wp.static(shape.modes)):
             F[m] = space.stress.traction(S, B[m])
-        # τ : G v, since Dₑ : G v is at hand.
-        power = volume * space.stress.complementary(tau, whole, material.lame, material.shear, material.young)
+            power += wp.dot(v[m], space.stress.traction(tau, B[m]))
         if wp.static(shape.partial > 0):
-            W = Parts()
+            W, R = Parts(), Parts()
+            G_v = (wp.transpose(v) * B) / volume
             for p in range(wp.static(shape.partial)):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
                 W[p] = real(CORNER_SHARE) * stress_parts[p] + rough
-                power += share * space.stress.complementary(
-                    rough, part, material.lame, material.shear, material.young
-                )
+                R[p] = rough
             bent = types.tensor()
             for q in range(wp.static(len(shape.links))):
                 pull = share * space.stress.traction(
@@ -291,6 +302,11 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
                 )
                 F[wp.static(shape.links[q][0])] += pull
                 bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
+                bend = v[wp.static(shape.links[q][0])] - G_v * x[wp.static(shape.links[q][0])]
+                power += share * wp.dot(
+                    bend,
+                    space.stress.traction(R[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]),
+                )
             bent = bent / volume
             for m in range(wp.static(shape.modes)):
                 F[m] -= bent * B[m]
@@ -336,13 +352,14 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
                 f += forces[c, k]
         dt, mass, v_half = time_step[0], nodes.mass[i], nodes.half[i].v
         h = real(0.5) * dt
-        b = body_force[2]
+        b, decay = body_force[STAGES - 1], wp.exp(-damping * h)
         a = f / mass + b
-        free = wp.exp(-damping * h) * v_half + h * a
+        free = decay * v_half + h * a
         v = hold(i, free, END, held)
         book = nodes.books[i]
-        book[FORCES] += wp.float64(dt * mass * wp.dot(b, v_half))
+        book[FORCES] += wp.float64(h * mass * wp.dot(body_force[0] + b, v_half))
         book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
+        book[DAMPING] += wp.float64((real(1.0) / decay - decay) * mass * wp.length_sq(v_half))
         nodes.books[i] = book
         row = held.row[i]
         if row >= 0 and h > real(0.0):

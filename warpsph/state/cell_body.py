@@ -12,8 +12,10 @@ from ..scene.scene import Scene
 from .body import Body, shared_parts
 from .cells import cell_table
 
-# Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
-FORCES, CONDITIONS, FLOW = 0, 1, 2
+# Entries of a node's books, energies [J]: work of the body force, of conditions, of tractions; what damping, elastic
+# strain and flow took.
+FORCES, CONDITIONS, LOADS, DAMPING, ELASTIC, FLOW = range(6)
+Books = wp.types.vector(length=6, dtype=wp.float64)
 
 
 @cache
@@ -37,7 +39,7 @@ def cell_node_types(space: Space) -> tuple[type, type]:
         velocity_gradient: wp.array(dtype=types.tensor)
         elastic_rate: wp.array(dtype=types.stress)
         acceleration: wp.array(dtype=types.vector)
-        books: wp.array(dtype=wp.vec3d)
+        books: wp.array(dtype=Books)
         strained: wp.array(dtype=space.real)
 
     return Half, CellNodes
@@ -51,7 +53,7 @@ class CellBody(Body):
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
-            all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
+            all forces but those of the conditions; `books` [J], entries `FORCES` to `FLOW`;
             `strained` ∫ |d| dt since the step was last measured.
         corners: node indices of each cell, shape (m, c).
     """
@@ -78,7 +80,7 @@ class CellBody(Body):
             "velocity_gradient": types.tensor,
             "elastic_rate": types.stress,
             "acceleration": types.vector,
-            "books": wp.vec3d,
+            "books": Books,
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 
@@ -10,6 +12,7 @@ from ..device.launching import Launcher
 from ..errors import SceneError
 from ..mesh.kinds import KINDS
 from ..mesh.mesh import Mesh
+from ..operators.cell_energy import CellEnergy
 from ..operators.cell_limit import CellLimit
 from ..operators.cell_passes import (
     LEAST_VOLUME,
@@ -26,7 +29,8 @@ from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
 from ..state.cell_body import CellBody
-from ..state.clock import Clock
+from ..state.clock import Clock, Outcome
+from ..state.energy import Energy
 from .step import Stepper
 
 
@@ -65,22 +69,35 @@ class CellStepper(Stepper):
         self._forces = wp.zeros((cells, body.kind.corners), dtype=space.types.vector, device=device)
         self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
-        self._limit = CellLimit(body, clock)
+        self._limit, self._energy = CellLimit(body, clock), CellEnergy(body, self.rough_loss)
         self._kick = kick_kernel(space, moves)
         self._strain, self._force = strain_kernel(space, body.kind), force_kernel(space, body.kind, body.law)
         self._stress = stress_kernel(space, body.kind, body.law, body.slots, moves)
         self._push = push_kernel(space, body.kind, body.slots)
         kernels = (self._kick, self._strain, self._stress, self._force, self._push)
         super().__init__(launcher, clock, parts=(self._limit,))
-        load_kernels([*kernels, *clock.kernels, *self._limit.kernels], device)
+        load_kernels([*kernels, *clock.kernels, *self._limit.kernels, *self._energy.kernels], device)
         self._limit.refresh()
         self.clock.begin([0.0], 0.0)
         self.step()  # of no length: what the initial state asks for, and the accelerations it begins with
+        self._energy.open()
 
     @property
     def shrinkage(self) -> float:
         """Least time of a wave across a cell over the initial one, at most 1."""
         return self._limit.shrinkage
+
+    def energy(self) -> Energy:
+        """The energy balance since t = 0."""
+        return self._energy.now()
+
+    def advance(self, times: Sequence[float], dt: float, courant: float) -> Outcome:
+        """Make a step from each of the times to Δt later, the first step of all alone; see `Stepper.advance`."""
+        if self._energy.begun:
+            return super().advance(times, dt, courant)
+        outcome = super().advance(times[:1], dt, courant)
+        self._energy.begin()
+        return outcome
 
     def step(self) -> None:
         """Advance the nodes by the clock's Δt."""
@@ -93,7 +110,7 @@ class CellStepper(Stepper):
         launch(self._stress, points, [*inputs, self._numbers, nodes, body.internals, self._limit.outdated, faults])
         inputs = [body.parameters, wave_speed, dt, body.corners, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
-        inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
+        inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         clock.tick()
 
