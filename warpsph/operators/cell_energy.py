@@ -12,10 +12,10 @@ from ..state.cell_body import (
     CONDITIONS,
     DAMPING,
     ELASTIC,
+    ENTRIES,
     FLOW,
     FORCES,
     LOADS,
-    Books,
     CellBody,
     cell_node_types,
 )
@@ -72,8 +72,8 @@ class CellEnergy:
         )
 
 
-ENTRIES = Books._length_
-Totals = wp.types.vector(length=ENTRIES + 1, dtype=wp.float64)  # of the books, then the kinetic energy
+KINETIC = len(ENTRIES)
+Totals = wp.types.vector(length=KINETIC + 1, dtype=wp.float64)  # of the books, then the kinetic energy
 
 
 @cache
@@ -84,10 +84,11 @@ def _opening_kernel(space: Space, law: Law):
     @forward_kernel
     def opening(first: int, material: law.Parameters, nodes: CellNodes):
         i = first + wp.tid()
-        sigma, book = space.phi.stress(nodes.point[i].phi), Books()
+        sigma = space.phi.stress(nodes.point[i].phi)
         twice = space.stress.complementary(sigma, sigma, material.lame, material.shear, material.young)
-        book[ELASTIC] = wp.float64(real(0.5) * nodes.volume[i] * twice)
-        nodes.books[i] = book
+        for row in range(KINETIC):
+            nodes.books[row, i] = wp.float64(0.0)
+        nodes.books[ELASTIC, i] = wp.float64(real(0.5) * nodes.volume[i] * twice)
 
     return opening
 
@@ -102,10 +103,10 @@ def _sum_kernel(space: Space):
         k = first + wp.tid()
         total = Totals()
         for i in range(SHARE * k, wp.min(SHARE * (k + 1), nodes.mass.shape[0])):
-            book, half, v = nodes.books[i], nodes.half[i].v, space.phi.velocity(nodes.point[i].phi)
-            for entry in range(ENTRIES):
-                total[entry] += book[entry]
-            total[ENTRIES] += wp.float64(real(0.5) * nodes.mass[i] * wp.dot(half, real(2.0) * v - half))
+            half, v = nodes.half[i].v, space.phi.velocity(nodes.point[i].phi)
+            for row in range(KINETIC):
+                total[row] += nodes.books[row, i]
+            total[KINETIC] += wp.float64(real(0.5) * nodes.mass[i] * wp.dot(half, real(2.0) * v - half))
         result[k] = total
 
     return sums

@@ -34,6 +34,12 @@ def numbers_of(space: Space, shape: CellShape) -> int:
     return 1 + space.dim**2 * (1 + shape.partial)
 
 
+@wp.func
+def enter(row: int, i: int, energy: wp.float64, books: wp.array2d(dtype=wp.float64)):
+    """Add an energy to a node's books; `+=` would be atomic."""
+    books[row, i] = books[row, i] + energy
+
+
 @cache
 def _tensors(space: Space) -> tuple[wp.Function, wp.Function]:
     """(cell, which, numbers) → one of the tensors that the strain pass has left of a cell, and what leaves it."""
@@ -79,11 +85,8 @@ def kick_kernel(space: Space, moves: bool):
             nodes.half[i].x = point.x
         if held.row[i] >= 0:  # what holds it pushes before the damping, and takes its jumps
             jumps = real(0.5) * (wp.length_sq(last) - wp.length_sq(v - start))
-            book = nodes.books[i]
-            book[CONDITIONS] += wp.float64(
-                nodes.mass[i] * (wp.exp(damping * h) * wp.dot(v - free, v) + jumps)
-            )
-            nodes.books[i] = book
+            pushes = wp.exp(damping * h) * wp.dot(v - free, v)
+            enter(CONDITIONS, i, wp.float64(nodes.mass[i] * (pushes + jumps)), nodes.books)
 
     return kick
 
@@ -189,7 +192,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
             Q = space.algebra.rotation(L, real(0.5) * dt)
             turned = space.stress.transform(turned, Q)
         trial = turned + dt * rate
-        sigma, book = trial, nodes.books[i]
+        sigma, taken = trial, wp.float64(0.0)
         if wp.static(law.flows):
             own = internal()
             if wp.static(remembers):
@@ -197,15 +200,17 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, slots: bool, moves: bo
             sigma, own = law.relax(trial, own, material, dt)
             if wp.static(remembers):
                 internals[i] = own
-            lost = space.stress.complementary(
-                turned + sigma, trial - sigma, material.lame, material.shear, material.young
-            )
-            book[FLOW] += wp.float64(real(0.5) * volume * lost)
-        kept = space.stress.complementary(
-            turned + sigma, sigma - turned, material.lame, material.shear, material.young
-        )
-        book[ELASTIC] += wp.float64(real(0.5) * volume * kept)
-        nodes.books[i] = book
+            lost = trial - sigma
+            if wp.length_sq(lost) > real(0.0):
+                work = space.stress.complementary(
+                    turned + sigma, lost, material.lame, material.shear, material.young
+                )
+                taken = wp.float64(real(0.5) * volume * work)
+                enter(FLOW, i, taken, nodes.books)
+        power, mean = real(0.0), turned + sigma
+        for a in range(wp.static(d)):  # 2 σ : L
+            power += space.stress.traction(mean, L[a])[a]
+        enter(ELASTIC, i, wp.float64(real(0.5) * dt * volume * power) - taken, nodes.books)
         if wp.static(moves and d > 1):
             sigma = space.stress.transform(sigma, Q)
         u = nodes.displacement[i] + dt * half.v
@@ -255,7 +260,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
         packed_table(corners)
         packed_numbers(numbers)
         packed_forces(forces)
-        x, v, dt = shape.Modes(), shape.Modes(), time_step[0]
+        x, dt = shape.Modes(), time_step[0]
         mean, mean_rate = types.stress(), types.stress()
         stress_parts, rate_parts = Parts(), Parts()
         for k in range(wp.static(n)):
@@ -264,7 +269,6 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
             rate = nodes.elastic_rate[i]
             sigma = space.phi.stress(point.phi)
             x += wp.outer(T[k], point.x)
-            v += wp.outer(T[k], space.phi.velocity(point.phi))  # of tⁿ: the push comes after
             mean += sigma
             mean_rate += rate
             for p in range(wp.static(shape.partial)):
@@ -282,19 +286,21 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
         whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
         tau = eta * (whole - real(per_corner) * mean_rate)
         S = real(per_corner) * mean + tau
-        F, power = shape.Modes(), real(0.0)
+        F = shape.Modes()
         for m in range(wp.static(shape.modes)):
             F[m] = space.stress.traction(S, B[m])
-            power += wp.dot(v[m], space.stress.traction(tau, B[m]))
+        # τ : G v, since Dₑ : G v is at hand.
+        power = volume * space.stress.complementary(tau, whole, material.lame, material.shear, material.young)
         if wp.static(shape.partial > 0):
-            W, R = Parts(), Parts()
-            G_v = (wp.transpose(v) * B) / volume
+            W = Parts()
             for p in range(wp.static(shape.partial)):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
                 W[p] = real(CORNER_SHARE) * stress_parts[p] + rough
-                R[p] = rough
+                power += share * space.stress.complementary(
+                    rough, part, material.lame, material.shear, material.young
+                )
             bent = types.tensor()
             for q in range(wp.static(len(shape.links))):
                 pull = share * space.stress.traction(
@@ -302,11 +308,6 @@ def force_kernel(space: Space, kind: CellKind, law: Law):
                 )
                 F[wp.static(shape.links[q][0])] += pull
                 bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
-                bend = v[wp.static(shape.links[q][0])] - G_v * x[wp.static(shape.links[q][0])]
-                power += share * wp.dot(
-                    bend,
-                    space.stress.traction(R[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]),
-                )
             bent = bent / volume
             for m in range(wp.static(shape.modes)):
                 F[m] -= bent * B[m]
@@ -356,14 +357,16 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         a = f / mass + b
         free = decay * v_half + h * a
         v = hold(i, free, END, held)
-        book = nodes.books[i]
-        book[FORCES] += wp.float64(h * mass * wp.dot(body_force[0] + b, v_half))
-        book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
-        book[DAMPING] += wp.float64((real(1.0) / decay - decay) * mass * wp.length_sq(v_half))
-        nodes.books[i] = book
+        pull = body_force[0] + b
+        if wp.length_sq(pull) > real(0.0):
+            enter(FORCES, i, wp.float64(h * mass * wp.dot(pull, v_half)), nodes.books)
+        if damping > real(0.0):
+            lost = mass * wp.length_sq(v_half) * (real(1.0) / decay - decay)
+            enter(DAMPING, i, wp.float64(lost), nodes.books)
         row = held.row[i]
         if row >= 0 and h > real(0.0):
             reactions[row] = (mass / h) * (v - free)
+            enter(CONDITIONS, i, wp.float64(mass * wp.dot(v - free, v_half)), nodes.books)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi

@@ -12,10 +12,9 @@ from ..scene.scene import Scene
 from .body import Body, shared_parts
 from .cells import cell_table
 
-# Entries of a node's books, energies [J]: work of the body force, of conditions, of tractions; what damping, elastic
-# strain and flow took.
-FORCES, CONDITIONS, LOADS, DAMPING, ELASTIC, FLOW = range(6)
-Books = wp.types.vector(length=6, dtype=wp.float64)
+# Rows of the nodes' books, energies [J]: work of the body force, of conditions on velocities, of tractions; what
+# damping, elastic strain and flow took.
+ENTRIES = FORCES, CONDITIONS, LOADS, DAMPING, ELASTIC, FLOW = tuple(range(6))
 
 
 @cache
@@ -39,7 +38,7 @@ def cell_node_types(space: Space) -> tuple[type, type]:
         velocity_gradient: wp.array(dtype=types.tensor)
         elastic_rate: wp.array(dtype=types.stress)
         acceleration: wp.array(dtype=types.vector)
-        books: wp.array(dtype=Books)
+        books: wp.array2d(dtype=wp.float64)
         strained: wp.array(dtype=space.real)
 
     return Half, CellNodes
@@ -53,7 +52,7 @@ class CellBody(Body):
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
-            all forces but those of the conditions; `books` [J], entries `FORCES` to `FLOW`;
+            all forces but those of the conditions; `books` [J], a row each of `ENTRIES`;
             `strained` ∫ |d| dt since the step was last measured.
         corners: node indices of each cell, shape (m, c).
     """
@@ -80,10 +79,10 @@ class CellBody(Body):
             "velocity_gradient": types.tensor,
             "elastic_rate": types.stress,
             "acceleration": types.vector,
-            "books": Books,
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
+        nodes.books = wp.zeros((len(ENTRIES), n), dtype=wp.float64, device=device)
         corners = cell_table(mesh, mesh.kind, device)
         return CellBody(nodes=nodes, auxiliary=None, corners=corners, **shared_parts(scene, space, launcher))
 
