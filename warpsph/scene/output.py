@@ -14,6 +14,8 @@ from ..validate import choice, index, instance, listed, number, vector
 from .place import node_at
 from .selection import Selection
 
+ENERGY_COLUMN = "energy."  # how names of a history's energies begin
+
 
 @dataclass(frozen=True)
 class Probe:
@@ -159,8 +161,9 @@ class Output:
         names = ["step", "time"]
         object.__setattr__(self, "probes", listed("Output.probes", self.probes, Probe, "a sequence of Probe"))
         for probe in self.probes:
-            if probe.name in names:
-                raise SceneError("Output.probes", probe.name, f"names must differ, and from {names[:2]}")
+            if probe.name in names or probe.name.startswith(ENERGY_COLUMN):
+                allowed = f"names must differ, and from {names[:2]} and those of energies, {ENERGY_COLUMN}…"
+                raise SceneError("Output.probes", probe.name, allowed)
             names.append(probe.name)
         if self.interval is not None:
             number("Output.interval", self.interval, at_least=0.0)

@@ -6,6 +6,10 @@ from dataclasses import dataclass, fields
 
 UNITS = {1: "J/m²", 2: "J/m", 3: "J"}  # of a bar for its section, of plane strain for its thickness
 
+TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping")  # where it is, or went
+GIVEN = ("gravity", "loads", "walls")  # where it came from
+COLUMNS = (*TAKEN, *GIVEN, "unaccounted")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Energy:
@@ -36,8 +40,8 @@ class Energy:
     @property
     def unaccounted(self) -> float:
         """What is there, or was taken, and never came in; negative where energy has vanished."""
-        taken = self.kinetic + self.elastic + self.flow + self.viscous + self.damping
-        return taken - (self.initial + self.gravity + self.loads + self.walls)
+        taken, given = (sum(getattr(self, name) for name in names) for names in (TAKEN, GIVEN))
+        return taken - (self.initial + given)
 
     @property
     def largest(self) -> float:
@@ -47,6 +51,3 @@ class Energy:
     def columns(self) -> dict[str, float]:
         """What changes in the course of a run, by name."""
         return {name: getattr(self, name) for name in COLUMNS}
-
-
-COLUMNS = (*(field.name for field in fields(Energy) if field.name != "initial"), "unaccounted")
