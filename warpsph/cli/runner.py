@@ -279,7 +279,7 @@ def _tell(course: Course, summary: Mapping, pictures: list[str], quiet: bool, sa
 
 
 def _energy_line(energy: Mapping) -> str:
-    """What came in, where it is or went, and what is unaccounted for; what is less than a thousandth is left out."""
+    """What came in, where it is or went, and what is unaccounted for, without what is less than a thousandth."""
     values = {name: energy[name] for name in ("initial", *GIVEN, *TAKEN)}
     if any(value is None for value in values.values()):
         return "energy: not finite any more"

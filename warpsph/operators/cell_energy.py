@@ -1,4 +1,4 @@
-"""The energy of a body of the scheme `cells`: what its nodes have, and what the passes of its steps have booked."""
+"""The energy of a body of the scheme `cells`: what its nodes have, and what its steps have booked."""
 
 from functools import cache
 
@@ -52,7 +52,7 @@ class CellEnergy:
         self.initial = self.now().unaccounted
 
     def begin(self) -> None:
-        """After the first step: what the leapfrog keeps differs by O(Δt²) from what was there (METHOD section 8)."""
+        """After the first step: what the leapfrog keeps is O(Δt²) from what was there (METHOD section 8)."""
         self.initial, self.begun = self.initial + self.now().unaccounted, True
 
     def now(self) -> Energy:

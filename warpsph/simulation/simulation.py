@@ -166,7 +166,7 @@ class Simulation:
             raise breakdown(self, fault, dt)
 
     def _watch_energy(self) -> str | None:
-        """Now and then, at steps that do not depend on who observes: whether energy has come from nowhere, or gone."""
+        """At some steps, whoever observes: whether energy has come from nowhere, or gone."""
         balance = self.stepper.energy() if self.steps % WATCH == 0 else None
         if balance is None:
             return None

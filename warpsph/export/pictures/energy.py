@@ -17,7 +17,7 @@ from ...state.energy import TAKEN
 from ..colours import COLOUR_MAP
 from .figures import BRIGHT, axis_label, new_figure, save_picture
 
-LEAST = 1e-3  # of the largest total: what is less is not drawn
+LEAST = 1e-2  # of the largest total: what is less is not drawn
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,8 @@ class EnergyCurve:
     @staticmethod
     def of(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> EnergyCurve | None:
         """That of a history's columns; None where it has no energies."""
-        found = {
-            name.removeprefix(ENERGY_COLUMN): values
-            for name, values in columns.items()
-            if name.startswith(ENERGY_COLUMN)
-        }
+        energies = [name for name in columns if name.startswith(ENERGY_COLUMN)]
+        found = {name.removeprefix(ENERGY_COLUMN): columns[name] for name in energies}
         return EnergyCurve(columns["time"], found, units[ENERGY_COLUMN + TAKEN[0]]) if found else None
 
     def draw(self, axes: Axes) -> None:
@@ -54,7 +51,7 @@ class EnergyCurve:
         if names:
             axes.stackplot(self.time, *parts, labels=names, colors=shades, linewidth=0.0)
         axes.plot(self.time, total - self.columns["unaccounted"], color=BRIGHT, linewidth=1.2, label="came in")
-        axes.legend(frameon=False, fontsize=8, loc="upper left")
+        axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
         axes.set(xlabel=axis_label("time", "s"), ylabel=axis_label("energy", self.unit))
         axes.locator_params(axis="x", nbins=5)
         axes.margins(x=0.0)
@@ -70,6 +67,6 @@ def plot_energy(simulation: Simulation, history: History, path: Path) -> bool:
     figure = new_figure((7.0, 4.5))
     axes = figure.add_subplot()
     curve.draw(axes)
-    axes.set_title(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
+    figure.suptitle(f"{simulation.scene.name}, t = {simulation.time:.4g} s")
     save_picture(figure, path)
     return True
