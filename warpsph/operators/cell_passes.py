@@ -83,8 +83,10 @@ def kick_kernel(space: Space, moves: bool):
             nodes.half[i].x = point.x + h * v
         else:
             nodes.half[i].x = point.x
-        if held.row[i] >= 0:  # what holds it pushes before the damping, and takes its jumps
-            jumps = real(0.5) * (wp.length_sq(last) - wp.length_sq(v - start))
+        row = held.row[i]
+        if row >= 0:  # what holds it pushes before the damping, and takes the jumps of what it holds
+            P, jump = held.projector[row], v - start
+            jumps = real(0.5) * (wp.length_sq(last - P * last) - wp.length_sq(jump - P * jump))
             pushes = wp.exp(damping * h) * wp.dot(v - free, v)
             enter(CONDITIONS, i, wp.float64(nodes.mass[i] * (pushes + jumps)), nodes.books)
 

@@ -171,7 +171,7 @@ class Simulation:
         if balance is None:
             return None
         self.largest_energy = max(self.largest_energy, balance.largest)
-        return UNACCOUNTED if abs(balance.unaccounted) > MOST_UNACCOUNTED * self.largest_energy else None
+        return UNACCOUNTED if abs(balance.amiss) > MOST_UNACCOUNTED * self.largest_energy else None
 
     @exclusive
     def energy(self) -> Energy | None:

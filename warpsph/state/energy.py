@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 UNITS = {1: "J/m²", 2: "J/m", 3: "J"}  # of a bar for its section, of plane strain for its thickness
 
 TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping")  # where it is, or went
+LOSSES = TAKEN[2:]
 GIVEN = ("gravity", "loads", "walls")  # where it came from
 COLUMNS = (*TAKEN, *GIVEN, "unaccounted")
 
@@ -42,6 +43,12 @@ class Energy:
         """What is there, or was taken, and never came in; negative where energy has vanished."""
         taken, given = (sum(getattr(self, name) for name in names) for names in (TAKEN, GIVEN))
         return taken - (self.initial + given)
+
+    @property
+    def amiss(self) -> float:
+        """What can not be true: `unaccounted`, or what a loss has given, where that is more."""
+        given = -min(getattr(self, name) for name in LOSSES)
+        return self.unaccounted if abs(self.unaccounted) >= given else given
 
     @property
     def largest(self) -> float:
