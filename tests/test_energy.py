@@ -91,6 +91,21 @@ def test_the_balance_closes_to_second_order(case):
     assert missing[1] < missing[0] / 2.0
 
 
+def test_a_wave_keeps_its_energy_from_step_to_step():
+    """Small displacements of a standing mode: ½ Σ m v² alone would swing by (½ωΔt)² of it; a tenth is allowed."""
+    k = np.pi
+    standing = scene(
+        velocity=lambda x, y: (1e-6 * np.sin(k * x) * np.cos(k * y), 1e-6 * np.cos(k * x) * np.sin(k * y)),
+        conditions=[Roller(edge(side)) for side in ("left", "right", "bottom", "top")],
+    )
+    simulation = Simulation(replace(standing, large_displacements=False), device="cpu")
+    half, missing = 0.5 * np.sqrt(2.0) * k * SOFT.wave_speed(2) * simulation.time_step_limit, []
+    for _ in range(40):
+        simulation.step()
+        missing.append(abs(simulation.energy().unaccounted))
+    assert simulation.energy().initial > 0.0 and max(missing) < 0.1 * half**2 * simulation.energy().initial
+
+
 def test_where_the_energy_of_flowing_soil_goes():
     """The elastic part is ½ Σ V σ : Dₑ⁻¹ : σ of the end to the size of elastic strains; flow takes most."""
     simulation = run(pressed(0.8)[1])
