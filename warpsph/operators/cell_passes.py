@@ -18,9 +18,9 @@ from ..device.compiling import forward_kernel
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cell_body import CONDITIONS, FLOW, FORCES, cell_node_types
+from ..state.cell_body import CONDITIONS, DAMPING, ELASTIC, FLOW, FORCES, cell_node_types
 from ..state.cells import NodeCells, cell_in_slot, corner_place
-from ..state.clock import END, FOLDED, HALF, NON_FINITE, TOO_FAST
+from ..state.clock import END, FOLDED, HALF, NON_FINITE, STAGES, TOO_FAST
 from .cell_shape import CellShape, cell_shape
 from .conditions import MOST_A_STEP
 from .held import held_types
@@ -46,6 +46,12 @@ def corner_share(sharpening: float) -> float:
 def numbers_of(space: Space, shape: CellShape) -> int:
     """How many numbers the strain pass leaves of a cell: A/n, e_T, κ_T, (A/n) G v, and each mode's part of it."""
     return 3 + space.dim**2 * (1 + shape.partial)
+
+
+@wp.func
+def enter(row: int, i: int, energy: wp.float64, books: wp.array2d(dtype=wp.float64)):
+    """Add an energy to a node's books; `+=` would be atomic."""
+    books[row, i] = books[row, i] + energy
 
 
 @cache
@@ -82,17 +88,21 @@ def kick_kernel(space: Space, moves: bool):
         packed_nodes(nodes)
         h = real(0.5) * time_step[0]
         point = nodes.point[i]
-        pushed = space.phi.velocity(point.phi) + h * nodes.acceleration[i]
-        free = wp.exp(-damping * h) * pushed
+        start = space.phi.velocity(point.phi)
+        last = start - nodes.half[i].v
+        free = wp.exp(-damping * h) * (start + h * nodes.acceleration[i])
         v = hold(i, free, HALF, held)
         nodes.half[i].v = v
         if wp.static(moves):
             nodes.half[i].x = point.x + h * v
         else:
             nodes.half[i].x = point.x
-        book = nodes.books[i]
-        book[CONDITIONS] += wp.float64(nodes.mass[i] * wp.dot(v - free, v))
-        nodes.books[i] = book
+        row = held.row[i]
+        if row >= 0:  # what holds it pushes before the damping, and takes the jumps of what it holds
+            P, jump = held.projector[row], v - start
+            jumps = real(0.5) * (wp.length_sq(last - P * last) - wp.length_sq(jump - P * jump))
+            pushes = wp.exp(damping * h) * wp.dot(v - free, v)
+            enter(CONDITIONS, i, wp.float64(nodes.mass[i] * (pushes + jumps)), nodes.books)
 
     return kick
 
@@ -229,15 +239,12 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
             nodes.velocity_gradient[i] = L
             rate = space.stress.elastic_rate(L, material.lame, material.shear, material.young)
         half, point = nodes.half[i], nodes.point[i]
-        turned, strained_by = space.phi.stress(point.phi), dt * rate
-        if wp.static(moves and d > 1):
-            # L is in the axes of the half step: half of the turn comes before it, half after. With all before,
-            # stresses lag behind their forces by half a step's turn, and pump energy into a body that spins.
-            half_turn = space.algebra.rotation(L, real(0.5) * dt)
-            turned = space.stress.transform(turned, half_turn * half_turn)
-            strained_by = space.stress.transform(strained_by, half_turn)
-        trial = turned + strained_by
-        sigma = trial
+        turned, Q = space.phi.stress(point.phi), types.tensor()
+        if wp.static(moves and d > 1):  # half of the turn before, half after: L is that of the half step
+            Q = space.algebra.rotation(L, real(0.5) * dt)
+            turned = space.stress.transform(turned, Q)
+        trial = turned + dt * rate
+        sigma, taken = trial, wp.float64(0.0)
         if wp.static(law.flows):
             own = internal()
             if wp.static(remembers):
@@ -245,15 +252,22 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
             sigma, own = law.relax(trial, own, material, dt)
             if wp.static(remembers):
                 internals[i] = own
-            mean_stress, lost = real(0.5) * (turned + sigma), trial - sigma
-            work = space.stress.complementary(mean_stress, lost, material.lame, material.shear, material.young)
-            book = nodes.books[i]
-            book[FLOW] += wp.float64(volume * work)
-            nodes.books[i] = book
+            lost = trial - sigma
             flowed = real(CALMING) * nodes.flowed[i]
-            if wp.dot(lost, lost) > real(0.0):
+            if wp.length_sq(lost) > real(0.0):
                 flowed = real(1.0)
+                work = space.stress.complementary(
+                    turned + sigma, lost, material.lame, material.shear, material.young
+                )
+                taken = wp.float64(real(0.5) * volume * work)
+                enter(FLOW, i, taken, nodes.books)
             nodes.flowed[i] = flowed
+        power, middle = real(0.0), turned + sigma
+        for a in range(wp.static(d)):  # 2 σ : L
+            power += space.stress.traction(middle, L[a])[a]
+        enter(ELASTIC, i, wp.float64(real(0.5) * dt * volume * power) - taken, nodes.books)
+        if wp.static(moves and d > 1):
+            sigma = space.stress.transform(sigma, Q)
         u = nodes.displacement[i] + dt * half.v
         nodes.displacement[i] = u
         if wp.static(moves):
@@ -394,18 +408,21 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
                 f += forces[c, k]
         dt, mass, v_half = time_step[0], nodes.mass[i], nodes.half[i].v
         h = real(0.5) * dt
-        b = body_force[2]
+        b, decay = body_force[STAGES - 1], wp.exp(-damping * h)
         a = f / mass + b
-        free = wp.exp(-damping * h) * v_half + h * a
+        free = decay * v_half + h * a
         v = hold(i, free, END, held)
-        book = nodes.books[i]
-        book[FORCES] += wp.float64(dt * mass * wp.dot(b, v_half))
-        book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
-        nodes.books[i] = book
+        pull = body_force[0] + b
+        if wp.length_sq(pull) > real(0.0):
+            enter(FORCES, i, wp.float64(h * mass * wp.dot(pull, v_half)), nodes.books)
+        if damping > real(0.0):
+            lost = mass * wp.length_sq(v_half) * (real(1.0) / decay - decay)
+            enter(DAMPING, i, wp.float64(lost), nodes.books)
         row = held.row[i]
         if row >= 0:
             if h > real(0.0):
                 reactions[row] = (mass / h) * (v - free)
+                enter(CONDITIONS, i, wp.float64(mass * wp.dot(v - free, v_half)), nodes.books)
             else:  # before the first step: what holds the node back
                 reactions[row] = mass * (held.projector[row] * a - a)
         nodes.acceleration[i] = a
