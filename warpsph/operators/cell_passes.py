@@ -18,7 +18,7 @@ from ..device.compiling import forward_kernel
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cell_body import CONDITIONS, DAMPING, ELASTIC, FLOW, FORCES, cell_node_types
+from ..state.cell_body import CONDITIONS, DAMPING, ELASTIC, FLOW, FORCES, cell_node_types, enter
 from ..state.cells import NodeCells, cell_in_slot, corner_place
 from ..state.clock import END, FOLDED, HALF, NON_FINITE, STAGES, TOO_FAST
 from .cell_shape import CellShape, cell_shape
@@ -46,12 +46,6 @@ def corner_share(sharpening: float) -> float:
 def numbers_of(space: Space, shape: CellShape) -> int:
     """How many numbers the strain pass leaves of a cell: A/n, e_T, κ_T, (A/n) G v, and each mode's part of it."""
     return 3 + space.dim**2 * (1 + shape.partial)
-
-
-@wp.func
-def enter(row: int, i: int, energy: wp.float64, books: wp.array2d(dtype=wp.float64)):
-    """Add an energy to a node's books; `+=` would be atomic."""
-    books[row, i] = books[row, i] + energy
 
 
 @cache
@@ -240,7 +234,9 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
             rate = space.stress.elastic_rate(L, material.lame, material.shear, material.young)
         half, point = nodes.half[i], nodes.point[i]
         turned, Q = space.phi.stress(point.phi), types.tensor()
-        if wp.static(moves and d > 1):  # half of the turn before, half after: L is that of the half step
+        if wp.static(moves and d > 1):
+            # L is in the axes of the half step: half of the turn comes before straining, half after it. With all of
+            # it before, stresses lag behind their forces, and pump energy into a body that spins.
             Q = space.algebra.rotation(L, real(0.5) * dt)
             turned = space.stress.transform(turned, Q)
         trial = turned + dt * rate
@@ -252,8 +248,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
             sigma, own = law.relax(trial, own, material, dt)
             if wp.static(remembers):
                 internals[i] = own
-            lost = trial - sigma
-            flowed = real(CALMING) * nodes.flowed[i]
+            lost, flowed = trial - sigma, real(CALMING) * nodes.flowed[i]
             if wp.length_sq(lost) > real(0.0):
                 flowed = real(1.0)
                 work = space.stress.complementary(

@@ -18,6 +18,12 @@ ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW = tuple(range(5))
 LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
+@wp.func
+def enter(row: int, i: int, energy: wp.float64, books: wp.array2d(dtype=wp.float64)):
+    """Add an energy to a node's books; `+=` would be atomic."""
+    books[row, i] = books[row, i] + energy
+
+
 @cache
 def cell_node_types(space: Space) -> tuple[type, type]:
     """Warp structs: `Half`, x and v at the half step; `CellNodes`, the arrays of `CellBody.nodes`."""

@@ -104,6 +104,18 @@ class CellStepper(Stepper):
         """Least time of a wave across a cell over the initial one, at most 1."""
         return self._limit.shrinkage
 
+    def energy(self) -> Energy:
+        """The energy balance since t = 0."""
+        return self._energy.now()
+
+    def advance(self, times: Sequence[float], dt: float) -> Outcome:
+        """Make a step from each of the times to Δt later, the first step of all alone; see `Stepper.advance`."""
+        if self._energy.begun:
+            return super().advance(times, dt)
+        outcome = super().advance(times[:1], dt)
+        self._energy.begin()
+        return outcome
+
     def _unsharpen(self, given: np.ndarray) -> None:
         """Let σ be what, sharpened, is the stress that was given, so that what balanced the loads still does.
 
@@ -116,18 +128,6 @@ class CellStepper(Stepper):
             missing = given - self.body.nodes.sharpened.numpy()
             phi["phi"][:, d:] += missing / (1.0 + 0.5 * self._sharpening)
             self.body.nodes.point.assign(phi)
-
-    def energy(self) -> Energy:
-        """The energy balance since t = 0."""
-        return self._energy.now()
-
-    def advance(self, times: Sequence[float], dt: float) -> Outcome:
-        """Make a step from each of the times to Δt later, the first step of all alone; see `Stepper.advance`."""
-        if self._energy.begun:
-            return super().advance(times, dt)
-        outcome = super().advance(times[:1], dt)
-        self._energy.begin()
-        return outcome
 
     def step(self) -> None:
         """Advance the nodes by the clock's Δt."""
