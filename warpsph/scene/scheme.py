@@ -72,7 +72,7 @@ class Scheme:
     def nodal_forces(self) -> bool:
         """Whether loads are forces on nodes, and what a condition takes up is one.
 
-        Sums over neighbours have none: tractions are put in place in stresses of edge nodes (`Condition.tractions`).
+        Sums over neighbours have none: stresses of edge nodes are given tractions (`Condition.tractions`).
         """
         return self.sums is None
 
