@@ -50,9 +50,6 @@ class CellStepper(Stepper):
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
-
-    Raises:
-        SceneError: the scene asks for what this scheme has not.
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
