@@ -13,19 +13,12 @@ from ..mesh.kinds import KINDS
 from ..mesh.mesh import Mesh
 from ..operators.cell_energy import CellEnergy
 from ..operators.cell_limit import CellLimit
-from ..operators.cell_passes import (
-    corner_share,
-    force_kernel,
-    kick_kernel,
-    numbers_of,
-    push_kernel,
-    rate_kernel,
-    strain_kernel,
-    stress_kernel,
-)
+from ..operators.cell_numbers import numbers_of
+from ..operators.cell_passes import corner_share, force_kernel, strain_kernel
 from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
+from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
 from ..operators.sharpening import rate_mean_kernel, sharp_types, sharpen_kernel, stress_mean_kernel
 from ..physics.space import Space
 from ..scene.scene import Scene
