@@ -70,7 +70,7 @@ def checkerboard(simulation):
 
 
 def checks(run):
-    """The deepest tip, and the checkerboard over the speed g L/c of the swing; the complete scheme's is 0.28 of it.
+    """The deepest tip, and the checkerboard over the speed g L/c of the swing; the complete scheme's is 0.28.
 
     A bar whose weight is put on at once swings to twice the displacement at rest; a clamp that also holds the
     sides takes some of it.
