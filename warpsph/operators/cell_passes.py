@@ -5,8 +5,8 @@ G_p, taken a share κ of the way to the corner, and the stress of the node. L_i 
 nodal force is its exact adjoint. What L does not see, G_p v − L_i, all the way to the corner, is rough: it meets a
 viscosity, no smooth motion does.
 
-Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening of
-a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow.
+Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening
+of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow.
 """
 
 from functools import cache
@@ -27,8 +27,10 @@ from .held import held_types
 from .sharpening import around, sharp_types
 
 CALMING = 0.9  # a step: how fast a node that has flowed is taken for an elastic one again
+# Where soil flows κ is FLOWING_SHARE (b/BENT)², at most FLOWING_SHARE, with b = 0 in a parallelogram and 1 where a
+# corner folds: with viscosity alone against it, flow bends a cell further and further until it does.
+FLOWING_SHARE, BENT = 2.0 / 3.0, 0.5
 MOST_STRAIN = 0.02  # between two looks at the time step
-LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
 def corner_share(sharpening: float) -> float:
@@ -42,8 +44,8 @@ def corner_share(sharpening: float) -> float:
 
 
 def numbers_of(space: Space, shape: CellShape) -> int:
-    """How many numbers the strain pass leaves of a cell: A/n, e_T, (A/n) G v, and the part of each mode of it."""
-    return 2 + space.dim**2 * (1 + shape.partial)
+    """How many numbers the strain pass leaves of a cell: A/n, e_T, κ_T, (A/n) G v, and each mode's part of it."""
+    return 3 + space.dim**2 * (1 + shape.partial)
 
 
 @cache
@@ -56,14 +58,14 @@ def _tensors(space: Space) -> tuple[wp.Function, wp.Function]:
         result = tensor()
         for a in range(wp.static(d)):
             for b in range(wp.static(d)):
-                result[a, b] = numbers[c, 2 + d * d * which + d * a + b]
+                result[a, b] = numbers[c, 3 + d * d * which + d * a + b]
         return result
 
     @wp.func
     def put_tensor(c: int, which: int, value: tensor, numbers: wp.array2d(dtype=real)):
         for a in range(wp.static(d)):
             for b in range(wp.static(d)):
-                numbers[c, 2 + d * d * which + d * a + b] = value[a, b]
+                numbers[c, 3 + d * d * which + d * a + b] = value[a, b]
 
     return tensor_at, put_tensor
 
@@ -96,7 +98,7 @@ def kick_kernel(space: Space, moves: bool):
 
 
 @cache
-def strain_kernel(space: Space, kind: CellKind, flows: bool):
+def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float):
     """Of each cell, at the half step: A/n, e_T, (A/n) G v, and what its hourglass modes add to it."""
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
@@ -130,9 +132,16 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool):
         share = real(per_corner) * volume
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
-        numbers[c, 1] = real(1.0) - flowed
+        elastic = real(1.0) - flowed
+        numbers[c, 1] = elastic
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
+            bent = real(0.0)
+            for q in range(wp.static(len(shape.links))):
+                mode, axis = x[wp.static(shape.links[q][0])], frame[wp.static(shape.links[q][1])]
+                bent = wp.max(bent, wp.abs(wp.dot(mode, axis)) / real(BENT))
+            flowing = real(FLOWING_SHARE) * wp.min(bent * bent, real(1.0))
+            numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
@@ -146,7 +155,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool):
 
 
 @cache
-def rate_kernel(space: Space, kind: CellKind, slots: bool, corner_share: float):
+def rate_kernel(space: Space, kind: CellKind, slots: bool):
     """V and L of each node from its cells."""
     real, types, shape, CellNodes = space.real, space.types, cell_shape(space, kind), cell_node_types(space)[1]
     cell_at, place_of = cell_in_slot(kind), corner_place(kind)
@@ -157,7 +166,7 @@ def rate_kernel(space: Space, kind: CellKind, slots: bool, corner_share: float):
     def corner_gradient(c: int, k: int, numbers: wp.array2d(dtype=real)):
         g = tensor_at(c, 0, numbers)
         if wp.static(shape.partial > 0):
-            share = real(corner_share) * numbers[c, 1]
+            share = numbers[c, 2]
             for p in range(wp.static(shape.partial)):
                 g += (share * sign[k, p]) * tensor_at(c, 1 + p, numbers)
         return g
@@ -262,7 +271,7 @@ def stress_kernel(space: Space, kind: CellKind, law: Law, *, slots: bool, moves:
 
 
 @cache
-def force_kernel(space: Space, kind: CellKind, law: Law, *, corner_share: float, sharp: bool):
+def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
     """Of each cell, at t^{n+1}: what its stress, and the viscosity that rough motion meets, do to its corners."""
     real, types, n = space.real, space.types, kind.corners
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
@@ -324,7 +333,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, *, corner_share: float,
         # τ : G v, since Dₑ : G v is at hand.
         power = volume * space.stress.complementary(tau, whole, material.lame, material.shear, material.young)
         if wp.static(shape.partial > 0):
-            W, towards = Parts(), real(corner_share) * numbers[c, 1]
+            W, towards = Parts(), numbers[c, 2]
             for p in range(wp.static(shape.partial)):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
@@ -394,8 +403,11 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
         nodes.books[i] = book
         row = held.row[i]
-        if row >= 0 and h > real(0.0):
-            reactions[row] = (mass / h) * (v - free)
+        if row >= 0:
+            if h > real(0.0):
+                reactions[row] = (mass / h) * (v - free)
+            else:  # before the first step: what holds the node back
+                reactions[row] = mass * (held.projector[row] * a - a)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi
