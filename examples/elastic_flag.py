@@ -2,8 +2,8 @@
 
 A beam 0.35 m long and 0.02 m thick, clamped at its left end and straight at rest, is let go: it swings down, and
 comes back to where it began. Plane strain, large rotations. Reference: the tip between −128.8 and +1.5 mm, every
-0.913 s (Turek and Hron, finest level, a St. Venant-Kirchhoff solid). A scheme that loses energy or angular momentum
-loses the swing.
+0.913 s (Turek and Hron, finest level, a St. Venant-Kirchhoff solid). A scheme that loses energy or angular
+momentum loses the swing.
 """
 
 import numpy as np
