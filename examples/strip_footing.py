@@ -2,8 +2,10 @@
 
 Half of a stratum 14 m wide and 3 m deep under a smooth rigid footing 2 m wide, plane strain, von Mises. The
 footing is pressed down with a velocity that grows linearly. Exact limit load of the whole footing, rate
-independent: (2 + π) b Y0/√3 = 89.06 kN/m. `--set hardening=-1e6` softens: the soil then fails along two bands,
-a straight one from the footing's edge to the axis of symmetry and a curved one from there to the surface.
+independent: (2 + π) b Y0/√3 = 89.06 kN/m. `--set hardening=-1e6` softens, and what fails then depends on what
+holds the strain apart: by the published scheme, whose viscosity does (`--set numerics=published`), two bands as
+in the paper, a straight one from the footing's edge to the axis of symmetry and a curved one from there to the
+surface; by the default scheme, which has next to none, a wedge under the footing's edge breaks out on its own.
 """
 
 import math
@@ -90,7 +92,7 @@ def checks(run):
     """The mean load once the mechanism has formed (settlements from 9 mm on, t ≥ 2.45 s), and the second band.
 
     The band reaches the surface when no ray has less than a quarter of its median strain. With softening the load
-    falls instead, towards the residual strength.
+    falls instead, towards the residual strength, and only the published scheme's mechanism has this band.
     """
     p, load, settlement = run.parameters, run.history["load"], run.history["settlement"]
     strain = second_band(run.simulation.mesh, run.simulation.field("equivalent_plastic_strain")).strain
@@ -98,6 +100,7 @@ def checks(run):
     reaches = Check("second_band_weakest", float(strain.min()), median, "-", bound=0.75)
     if p.hardening < 0.0:
         left = float(load[-1] / load.max())
-        return [reaches, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
+        falls = Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)
+        return [falls, reaches] if p.numerics.scheme.sums else [falls]
     plateau = settlement >= 0.6 * settlement[-1]
     return [Check("limit_load", float(np.mean(load[plateau])), limit_load(p), "N/m", bound=0.02), reaches]

@@ -45,7 +45,7 @@ def test_a_column_that_tears_ends_where_it_tears():
     """It used to go on to 1e47 m/s and 1e131 m and to call itself finished."""
     scene = column()
     simulation = Simulation(scene, device="cpu")
-    with pytest.raises(BreakdownError, match=r"folded|part faster than waves|so flat") as caught:
+    with pytest.raises(BreakdownError, match=r"folded|faster than waves|so flat|from nowhere") as caught:
         simulation.run()
     assert caught.value.step == simulation.steps and 0.0 < caught.value.time < scene.duration
     assert np.abs(simulation.field("displacement")).max() < 4.0, "no further than twice the body's height"
@@ -84,9 +84,12 @@ def test_neighbours_part_no_faster_than_waves_but_a_body_may(scheme):
 
 
 def test_cells_pressed_flat_end_a_run_where_steps_lead_nowhere(monkeypatch):
-    """A plate drives a wall of soft cells flat; the step follows them down to a share of the first."""
-    monkeypatch.setattr(breakdown, "LEAST_STEP_SHARE", 0.3)
-    monkeypatch.setattr("warpsph.simulation.simulation.LEAST_STEP_SHARE", 0.3)
+    """A plate drives a wall of soft cells flat; the step follows them down to a share of the first.
+
+    With a cell's mass kept, a step goes with the root of its height: 0.55 at 0.3 of the height.
+    """
+    monkeypatch.setattr(breakdown, "LEAST_STEP_SHARE", 0.55)
+    monkeypatch.setattr("warpsph.simulation.simulation.LEAST_STEP_SHARE", 0.55)
     scene = Scene(
         shape=Box((1.0, 1.0), 0.25),
         material=SOFT,
@@ -97,7 +100,7 @@ def test_cells_pressed_flat_end_a_run_where_steps_lead_nowhere(monkeypatch):
     start = simulation.time_step_limit
     with pytest.raises(BreakdownError, match=r"cell \d+ is so flat that the time step is .* s, in step"):
         simulation.run()
-    assert 0.25 * start < simulation.time_step_limit < 0.3 * start
+    assert 0.5 * start < simulation.time_step_limit < 0.55 * start
 
 
 def test_a_run_that_breaks_down_exits_with_one_and_keeps_what_it_has(tmp_path, monkeypatch, capsys):

@@ -16,6 +16,7 @@ ROUND = {3: [0, 1, 2], 4: [0, 2, 3, 1]}  # the corners in the order in which one
 CORNER_SHARE = 2.0 / 3.0
 LEAST_VOLUME = 0.15
 CALMING = 0.9
+BENT = 0.5
 MEAN_YIELD_ITERATIONS = 4
 
 
@@ -122,9 +123,13 @@ def volumes(x, model):
     return volume
 
 
-def share_of(cell, flowed):
-    """κ of a cell: none where a corner has just flowed."""
-    return CORNER_SHARE * (1.0 - max(flowed[i] for i in cell))
+def share_of(cell, x, flowed):
+    """κ of a cell: where a corner has just flowed none, or what holds a cell that is bent already."""
+    lately, bent = max(flowed[i] for i in cell), 0.0
+    if len(cell) == 4:
+        frame = np.linalg.inv(x[cell].T @ ENDS / 4.0)
+        bent = np.abs(frame @ (ALTERNATING @ x[cell] / 4.0)).max() / BENT
+    return CORNER_SHARE * (1.0 - lately + lately * min(bent**2, 1.0))
 
 
 def nodal_gradients(x, v, flowed, model):
@@ -132,7 +137,7 @@ def nodal_gradients(x, v, flowed, model):
     L = np.zeros((len(x), 2, 2))
     for cell in model["cells"]:
         weight = area_and_slopes(x[cell])[0] / len(cell)
-        g = corner_gradients(x[cell], share_of(cell, flowed))
+        g = corner_gradients(x[cell], share_of(cell, x, flowed))
         for p, i in enumerate(cell):
             for k, j in enumerate(cell):
                 L[i] += weight * np.outer(v[j], g[p, k])
@@ -146,7 +151,7 @@ def forces(x, x_half, v_half, sigma, L, flowed, dt, model):
     for cell in model["cells"]:
         n = len(cell)
         (area, slopes), area0 = area_and_slopes(x[cell]), area_and_slopes(model["x0"][cell])[0]
-        smooth, whole = (corner_gradients(x[cell], share) for share in (share_of(cell, flowed), 1.0))
+        smooth, whole = (corner_gradients(x[cell], share) for share in (share_of(cell, x_half, flowed), 1.0))
         before = corner_gradients(x_half[cell], 1.0)
         speed2 = model["wave_speed"] ** 2 * area / area0  # the mass stays, and so does the stiffness
         frequency2 = n * speed2 * np.sum(slopes**2) / area**2
