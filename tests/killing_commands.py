@@ -63,6 +63,8 @@ def layer(path):
     if child == 0:
         status = 1
         try:
+            from pxr import Sdf
+
             with os.fdopen(there, "w") as file:
                 file.write(Sdf.Layer.OpenAsAnonymous(str(path)).ExportToString())
             status = 0
