@@ -27,7 +27,7 @@ from warpsph.cli.main import main
 LARGE = 64_000  # [kB]
 MNT_DETACH = 2  # of Linux
 OPTIONS = ("--device", "cpu", "--quiet")
-ENDS = {".png": DOT[-8:], ".vtp": b"</VTKFile>\n", ".pvd": b"</VTKFile>\n", ".csv": b"\n", ".json": b"}\n"}
+ENDS = {".png": DOT[-8:], ".vtp": b"</VTKFile>\n", ".pvd": b"</VTKFile>", ".csv": b"\n", ".json": b"}\n"}
 
 
 class Disks:

@@ -10,25 +10,14 @@ import time
 
 from tests.killing_commands import Kills, main_of
 
-# As the installed script begins; it says so when it has set its handler, before which there is Python alone.
-BEGIN = """
-import os, signal, sys
-from warpsph.__main__ import main
-
-def first(number, handler, install=signal.signal):
-    signal.signal = install
-    install(number, handler)
-    os.write(1, b".")
-
-signal.signal = first
-sys.exit(main())
-"""
+# As the installed script begins: it says so, then runs the command.
+BEGIN = "import os, sys; from warpsph.__main__ import main; os.write(1, b'.'); sys.exit(main())"
 NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 TERMINALS = (signal.SIGINT, signal.SIGHUP)  # they reach all processes that belong to a terminal
 
 
 def begun(*arguments, **changed):
-    """A command that has just begun, in a session of its own, with that environment beside ours."""
+    """A command in its first instruction, in a session of its own, with that environment beside ours."""
     process = subprocess.Popen(
         [sys.executable, "-c", BEGIN, *map(str, arguments)],
         env=os.environ | {"NO_SIGNAL": "yes"} | changed,

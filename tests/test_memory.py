@@ -48,8 +48,7 @@ def memory_of(folder, steps, interval, surface="None"):
     ("steps", "surface"),
     [
         (10_000, "FreeSurface()"),
-        pytest.param(10**6, "FreeSurface()", marks=pytest.mark.long),
-        pytest.param(10**6, "None", marks=pytest.mark.long),
+        *(pytest.param(10**6, s, marks=pytest.mark.long) for s in ("None", "FreeSurface()")),
     ],
 )
 def test_memory_does_not_grow_with_the_number_of_steps(steps, surface, tmp_path):
