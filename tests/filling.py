@@ -9,6 +9,7 @@ import io
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from tests.damaging import SCENE
 from tests.killing_commands import layer
 from tests.undrawn import DOT, as_a_dot
 from warpsph.cli.main import main
+from warpsph.storage.files import PART
 
 LARGE = 64_000  # [kB]
 MNT_DETACH = 2  # of Linux
@@ -42,9 +44,12 @@ class Disks:
         (self.disk / "plate.py").write_text(SCENE)
         self.whole = self.disk / "whole"
         begin = time.perf_counter()
-        assert self.forked(*self._run(self.whole)) == (0, "")
+        done = self.forked(*self._run(self.whole))
+        assert done == (0, ""), done
         self.longest = time.perf_counter() - begin
         self.need = sum(path.stat().st_size for path in self.whole.rglob("*") if path.is_file()) // 1000
+        self.stage = layer(self.whole / "run.usdc")
+        (self.disk / "notes.txt").write_text("mine")
 
     def _run(self, out):
         again = ("--frames", "6", "--checkpoint-every", "5", "--usd", out / "run.usdc", "--overwrite")
@@ -96,6 +101,8 @@ class Disks:
         outcome = self.forked(*arguments)
         self._resize(LARGE)
         self._ends_well(kind, outcome, *arguments)
+        assert not [path for path in self.disk.rglob("*") if PART.fullmatch(path.name)], "half a file is left"
+        assert (self.disk / "notes.txt").read_text() == "mine"
 
     def run(self):
         """A run on a full disk: what is there is whole; with room again it goes on, or begins anew."""
@@ -115,6 +122,11 @@ class Disks:
         """USD, ParaView and a picture: a former one stays, or the new one is whole."""
         for name in ("e.usdc", "e.usda", "e.pvd"):
             self.full(f"export {name}", 0.5 * self.need, "export", self.whole, self.disk / name)
+        for stage in self.disk.glob("e.usd*"):
+            assert _body(layer(stage)) == _body(self.stage), stage
+        if (self.disk / "e.pvd").exists():
+            named = re.findall('file="(.*?)"', (self.disk / "e.pvd").read_text())
+            assert len(named) == 7 and all((self.disk / name).is_file() for name in named), named
         self.full("plot", 40, "plot", self.whole)
         self._is_whole(self.disk)
         self._is_the_same(self.whole)
@@ -162,7 +174,7 @@ class Disks:
             if not path.is_file() or path.name[0] == ".":
                 continue
             content = path.read_bytes()
-            assert content.endswith(ENDS.get(path.suffix, b"")), path
+            assert content.endswith(ENDS.get(path.suffix, b"")), (path, content)
             if path.suffix == ".npz":
                 with np.load(path) as arrays:
                     assert all(arrays[name] is not None for name in arrays.files)
@@ -174,7 +186,12 @@ class Disks:
     def _is_the_same(self, folder):
         for path in (self.whole / "frames").iterdir():
             assert (folder / "frames" / path.name).read_bytes() == path.read_bytes(), path
-        assert layer(self.whole / "run.usdc") == layer(folder / "run.usdc")
+        assert self.stage == layer(folder / "run.usdc")
+
+
+def _body(text):
+    """A stage as text without its first line, which says whether the file was text itself."""
+    return text.partition("\n")[2]
 
 
 if __name__ == "__main__":

@@ -126,6 +126,16 @@ def test_letters_that_a_stream_can_not_show_are_written_otherwise(tmp_path):
     assert (tmp_path / "out").read_text() == r"\u0394t = 3 \xb5s\u2026"
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_stream_that_is_full_already_when_a_command_begins_is_no_error():
+    """In a program of one's own, which has written to it before."""
+    with open("/dev/full", "w") as file:
+        file.write("waits")
+        stream = Steady(file)
+        stream.write("is dropped")
+        stream.flush()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
