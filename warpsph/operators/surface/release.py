@@ -124,7 +124,10 @@ def free_surface_types(space: Space, walls: ConditionTypes) -> ConditionTypes:
     def released(sigma: types.stress, P: types.tensor, unloading: wp.array(dtype=real)):
         left = space.stress.transform(sigma, P)
         lost = in_space(sigma) - in_space(left)
-        taken = wp.static(space.dim) - wp.int32(wp.trace(P) + real(0.5))
+        taken, rest = wp.int32(0), wp.trace(P)
+        for k in range(wp.static(space.dim)):  # compared, not rounded: as an index NaN would lead anywhere
+            if rest < real(k) + real(0.5):
+                taken += 1
         return left - unloading[taken] * lost * space.stress.transform(space.stress.spherical(real(1.0)), P)
 
     @wp.func
