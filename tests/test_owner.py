@@ -202,6 +202,17 @@ def test_file_has_one_writer_and_leaves_no_mark(tmp_path):
     assert list(tmp_path.glob(".*")) == []
 
 
+@pytest.mark.parametrize("replaced", [False, True])
+def test_folder_that_is_taken_away_meanwhile_is_said(replaced, tmp_path):
+    """Also where another one stands in its place, with what has been written since."""
+    folder = tmp_path / "out"
+    with pytest.raises(OSError, match="taken away meanwhile"), owned(folder):
+        folder.rename(tmp_path / "elsewhere")
+        if replaced:
+            folder.mkdir()
+            (folder / MARK).touch()
+
+
 def test_hand_written_scene_in_its_own_folder_is_kept():
     assert run("plate.py", "--out", "out")[0] == 0
     scene = Path("out/scene.toml").read_bytes()
