@@ -101,6 +101,14 @@ def test_streams_that_are_closed_or_full_do_not_end_a_run():
         assert all(row.count(b",") == 2 for row in history.splitlines()), f"{name}: written into it"
 
 
+def test_no_file_takes_the_place_of_a_stream_that_is_closed():
+    """Or what a library writes to standard error would go into a file of the run's."""
+    opens = "open('a', 'w').fileno()"
+    code = f"from warpsph.cli.streams import steady_streams\nwith steady_streams():\n    assert {opens} > 2"
+    done = subprocess.run(["bash", "-c", '"$0" -c "$1" <&- >&- 2>&-', sys.executable, code], check=False)
+    assert done.returncode == 0
+
+
 @pytest.mark.parametrize(
     "changed",
     [
