@@ -42,6 +42,8 @@ class Disks:
         self.disk, self.chance, self.count = disk, random.Random(seed), {}
         self._mount()
         self._prepare()
+        self.copy = disk.with_name(f"{disk.name}-copy")
+        shutil.copytree(disk, self.copy)
 
     def _prepare(self):
         (self.disk / "plate.py").write_text(SCENE)
@@ -144,7 +146,7 @@ class Disks:
         self._without("taken", lambda: ctypes.CDLL(None).umount2(os.fsencode(self.disk), MNT_DETACH))
         shutil.rmtree(self.disk / "out", ignore_errors=True)
         self._mount()
-        self._prepare()
+        shutil.copytree(self.copy, self.disk, dirs_exist_ok=True)
 
     def removed(self):
         """Somebody removes the folder of a run in its midst, which does not call that a success either."""

@@ -20,6 +20,8 @@ def _mounts():
 @pytest.mark.parametrize("count", [6, pytest.param(200, marks=pytest.mark.long)])
 def test_full_and_vanishing_disks_leave_whole_files_and_one_line(count, tmp_path):
     """Runs, resumed runs, exports to USD and VTK; in the long form sweeps as well. Then all goes on as ever."""
-    command = [*OWN_MOUNTS, sys.executable, "-m", "tests.filling", str(tmp_path), str(count), "1"]
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = [*OWN_MOUNTS, sys.executable, "-m", "tests.filling", str(disk), str(count), "1"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
