@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 
@@ -10,9 +9,8 @@ import numpy as np
 import pytest
 
 from tests.test_restart import resumed, slope, started
-from warpsph import SceneError, Simulation
+from warpsph import SceneError
 from warpsph.errors import DamagedError
-from warpsph.export.frames import Frames, FrameWriter
 from warpsph.simulation.checkpoint import Checkpoint, write_checkpoint
 from warpsph.storage import reading
 
@@ -93,42 +91,6 @@ def test_checkpoint_whose_arrays_are_another_s_is_refused(saved, tmp_path):
     np.savez(tmp_path / "checkpoint.npz", **content)
     with pytest.raises(DamagedError, match="its arrays are not those that were written"):
         Checkpoint.read(tmp_path / "checkpoint.npz")
-
-
-@pytest.fixture(scope="module")
-def framed(tmp_path_factory):
-    """The folder of a run with frames."""
-    folder = tmp_path_factory.mktemp("framed")
-    simulation = Simulation(slope(), device="cpu")
-    simulation.run(until=0.1, observers=[FrameWriter(simulation, [0.0, 0.05, 0.1], folder)])
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("file", "name", "change", "message"),
-    [
-        ("000001.npz", "velocity", lambda v: v[:-1], r"velocity has shape \(\d+, 2\)"),
-        ("000001.npz", "density", lambda v: v.astype(np.int32), "density is of type int32"),
-        ("000001.npz", "stress", nan, "stress is not finite everywhere"),
-        ("000001.npz", "time", lambda v: v - 1.0, "its time is below 0"),
-        ("body.npz", "nodes", nan, "nodes is not finite everywhere"),
-        ("body.npz", "cells", out_of_range, "cells leads out of its table"),
-        ("body.npz", "cells", lambda v: v[:, :2].copy(), r"\(2, 2\)"),
-        ("body.npz", "faces", out_of_range, "faces leads out of its table"),
-        ("body.npz", "face_cell", lambda v: v[:-1], r"face_cell has shape \(\d+,\)"),
-        ("body.npz", "wall_0", out_of_range, "wall_0 leads out of its table"),
-    ],
-)
-def test_forged_frame_is_refused(file, name, change, message, framed, tmp_path):
-    """Its checksums fit; only a reader of the meaning sees that it is no frame of this body."""
-    shutil.copytree(framed / "frames", tmp_path / "frames")
-    path = tmp_path / "frames" / file
-    with np.load(path) as archive:
-        content = dict(archive)
-    content[name] = change(content[name])
-    np.savez(path, **content)
-    with pytest.raises(DamagedError, match=message):
-        list(Frames(tmp_path))
 
 
 @pytest.mark.parametrize("kind", ["folder", "pipe", "compressed", "objects"])
