@@ -13,6 +13,8 @@ import pytest
 from tests.damaging import SCENE, command
 from tests.killing_commands import NUMBER, having
 from tests.test_owner import SLOW
+from warpsph.cli.queue import processes
+from warpsph.cli.stopping import TERMINAL
 from warpsph.cli.streams import Steady
 
 COMMAND = [sys.executable, "-m", "warpsph"]
@@ -75,6 +77,19 @@ def test_runs_of_a_sweep_end_with_it_and_keep_a_checkpoint(number):
         time.sleep(0.1)
     assert having(mark) == []
     assert len(list(Path("out").rglob("checkpoint.npz"))) >= 1
+
+
+def deaf_to():
+    """Signals that do not reach this process."""
+    return signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no masks of signals on this system")
+def test_processes_of_a_sweep_leave_the_terminal_to_it_from_their_start():
+    """Ctrl-C while they import would end each of them in a traceback."""
+    with processes(1) as executor:
+        assert executor.submit(deaf_to).result(timeout=60) >= set(TERMINAL)
+    assert not deaf_to() & set(TERMINAL), "the sweep itself hears it"
 
 
 STREAMS = {
