@@ -4,7 +4,7 @@ One set of nodes carries position, velocity, stress and density (collocated); th
 
     dv_I/dt = Σ m_J (σ_I/ρ_I² + σ_J/ρ_J²) · ∇W_IJ,        L_I = Σ (m_J/ρ_J) (v_J − v_I) ⊗ ∇W_IJ,
 
-with the Gaussian W of the solver, of fixed h, without correction and without artificial viscosity; RK4 in time.
+with the Gaussian W of the solver's sums, of fixed h, without correction and artificial viscosity; RK4 in time.
 Elastic plane strain with the Jaumann rate, as in the solver. NumPy, all pairs: for some hundred nodes. A
 comparator beside the examples, no part of the solver.
 """
@@ -18,6 +18,10 @@ SUPPORT = 3.0  # radius of the support in smoothing lengths
 class StandardSPH:
     """A scene (plane strain, elastic; nodes under velocity conditions are held) by standard SPH.
 
+    Args:
+        scene: the scene.
+        smoothing_ratio: smoothing length over spacing h/Δx [-].
+
     Attributes:
         time: simulated time [s].
         x, v: positions [m] and velocities [m/s], shape (n, 2).
@@ -26,14 +30,14 @@ class StandardSPH:
         blown: whether it has failed: a node is farther from its start than the body is wide, or nowhere.
     """
 
-    def __init__(self, scene):
+    def __init__(self, scene, smoothing_ratio):
         mesh, material = scene.mesh, scene.material
         volume = mesh.node_volumes()[1]
         self.time, self.blown = 0.0, False
         self.x, self.v = mesh.nodes.copy(), scene.initial_velocity.copy()
         self.stress = scene.initial_stress.copy()
         self.density = np.full(len(volume), material.density)
-        self._mass, self._h = material.density * volume, scene.numerics.smoothing_ratio * np.sqrt(volume.mean())
+        self._mass, self._h = material.density * volume, smoothing_ratio * np.sqrt(volume.mean())
         self._lame, self._shear = material.lame_modulus, material.shear_modulus
         self._held = scene.boundary.nodes[scene.boundary.moved]
         self._start, self._size = mesh.nodes, np.ptp(mesh.nodes, axis=0).max()

@@ -2,14 +2,13 @@
 
 A vertical slope 4 m long and 2 m high, plane strain, Perzyna and von Mises with Y0 = 2 kPa. Gravity grows over
 1 s, a damping −50 v stands for the paper's artificial viscosity. For 35 s the soil flows out to the right like a
-viscous fluid. The paper's toe moved 1.5 m; the run-out depends on the damping and on the time step, and is
-reported, not tuned.
+viscous fluid. The paper's toe moved 1.5 m; the run-out depends on the damping, with the published scheme on the
+time step as well, and is reported, not tuned.
 """
 
 import numpy as np
 
 from warpsph import (
-    PUBLISHED,
     BodyForce,
     Box,
     Check,
@@ -28,7 +27,6 @@ from warpsph import (
 SIZE = (4.0, 2.0)
 TOE, CREST = (4.0, 0.0), (4.0, 2.0)
 
-NUMERICS = PUBLISHED
 SHORT = ("spacing=0.2", "duration=5")
 SOIL = PerzynaVonMises(young_modulus=8e7, poisson_ratio=0.3, density=2000.0, fluidity=1.0, yield_size=2e3)
 PARAMETERS = (
@@ -44,7 +42,7 @@ def scene(p):
         shape=Box(SIZE, p.spacing),
         material=SOIL.with_parameters(p),
         conditions=[Roller(edge("left")), Roller(edge("bottom"))],
-        free_surface=FreeSurface(),
+        free_surface=FreeSurface() if p.numerics.scheme.sums else None,  # free edges cost cells nothing
         body_force=BodyForce((0.0, -9.81), Ramp(1.0)),
         damping=p.damping,
         duration=p.duration,

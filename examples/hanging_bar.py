@@ -1,15 +1,15 @@
 """Hanging bar under its own weight: the checkerboard mode (Blanc and Pastor 2012, section 6.2).
 
-A block 0.2 m wide and 1 m high hangs from its fixed top and gravity acts from t = 0 on. With the complete scheme
-(`--set velocity_scheme=taylor`) a checkerboard grows in the vertical velocity; with the published velocity step
-there is none. The paper gives neither material nor spacing: those of its slope and a spacing of 0.05 m are our
-choice.
+A block 0.2 m wide and 1 m high hangs from its fixed top and gravity acts from t = 0 on. It swings to twice the
+displacement at rest and back. With the paper's complete scheme (`--set velocity_scheme=taylor`) a checkerboard
+grows in the vertical velocity; with the published velocity step (`--set numerics=published`) there is none, but
+the swing is filtered. The paper gives neither material nor spacing: those of its slope and a spacing of 0.05 m are
+our choice.
 """
 
 import numpy as np
 
 from warpsph import (
-    PUBLISHED,
     BodyForce,
     Box,
     Check,
@@ -28,7 +28,6 @@ from warpsph.analysis import checkerboard_amplitude
 SIZE = (0.2, 1.0)
 GRAVITY = 9.81  # [m/s²]
 
-NUMERICS = PUBLISHED
 PARAMETERS = (
     Parameter("spacing", 0.05, "m", "distance between neighbouring nodes"),
     Parameter("duration", 0.2, "s", "simulated time"),
@@ -71,8 +70,14 @@ def checkerboard(simulation):
 
 
 def checks(run):
-    """The checkerboard is at most a hundredth of the velocity; the complete scheme's is two fifths of it."""
+    """The deepest tip, and the checkerboard: the complete scheme's is two fifths of the velocity.
+
+    A bar whose weight is put on at once swings to twice the displacement at rest; a clamp that also holds the
+    sides takes some of it.
+    """
+    swing = 2.0 * static_tip(run.parameters)
     speed = float(np.sqrt(np.mean(run.simulation.field("velocity")[:, 1] ** 2)))
     return [
-        Check("checkerboard_share", checkerboard(run.simulation) / speed, 0.0, "of RMS v_y", 0.01, relative=False)
+        Check("deepest_tip", float(run.history["tip"].min()), swing, "m", 0.03),
+        Check("checkerboard_share", checkerboard(run.simulation) / speed, 0.0, "of RMS v_y", 0.01, relative=False),
     ]

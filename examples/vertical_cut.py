@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from warpsph import (
-    PUBLISHED,
     Box,
     Check,
     EdgeForce,
@@ -35,9 +34,7 @@ from warpsph.analysis import fit_band
 SIZE = (10.0, 10.0)
 WIDTH = 5.0  # of the footing [m]
 MECHANISM = (0.05, 0.15)  # settlements between which the mechanism stands and the shape has hardly changed [m]
-PAPER_STRAIN = 0.73  # largest ε̄ with H = 0
 
-NUMERICS = PUBLISHED
 SOIL = PerzynaVonMises(young_modulus=1e5, poisson_ratio=0.35, density=2000.0, fluidity=2.0, yield_size=200.0)
 PARAMETERS = (
     Parameter("spacing", 0.5, "m", "distance between neighbouring nodes"),
@@ -89,13 +86,18 @@ def width(mesh, positions):
 def band(mesh, strain):
     """The shear band, fitted to the strain ε̄ (n,) of the interior nodes where they were initially.
 
-    Edge nodes are left out: ε̄ there alternates from node to node at the free edge and peaks at the footing's end.
+    Edge nodes are left out: ε̄ peaks where the band meets the footing's end.
     """
     inside = ~edge("boundary").nodes(mesh)
     return fit_band(mesh.nodes[inside], strain[inside])
 
 
 def checks(run):
+    """The limit load over the footing's width, and the band's angle.
+
+    The largest ε̄ (the paper's is 0.73) is none of them: it is in one node, where the band meets an edge, and grows
+    as the spacing falls. There is no exact value.
+    """
     p, settlement = run.parameters, run.history["settlement"]
     load = run.history["load"] * WIDTH / run.history["width"]
     strain = run.simulation.field("equivalent_plastic_strain")
@@ -105,8 +107,7 @@ def checks(run):
         return [angle, Check("load_left", left, p.residual_ratio, "of the peak", 0.5, relative=False)]
     formed = (settlement >= MECHANISM[0]) & (settlement <= MECHANISM[1])
     return [
-        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
-        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N/m", bound=0.10, bound_below=0.02),
+        Check("limit_load", float(np.mean(load[formed])), limit_load(p), "N/m", bound=0.02),
+        Check("highest_load", float(np.max(load[formed])), limit_load(p), "N/m", bound=0.03),
         angle,
-        Check("largest_strain", float(strain.max()), PAPER_STRAIN, "-", 0.20),
     ]

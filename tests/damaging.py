@@ -32,7 +32,6 @@ def scene(p):
             young_modulus=8e7, poisson_ratio=0.3, density=2000.0, fluidity=5.0, yield_size=2e4
         ),
         conditions=[Fixed(edge("left")), PrescribedVelocity(edge("right"), (1.0, None))],
-        free_surface=FreeSurface(),
         duration=0.01,
         numerics=p.numerics,
         output=Output(interval=0.0, probes=(Probe("width", "m", width),)),

@@ -73,7 +73,7 @@ def main(folder, most):
 
 def check_final(whole, broken):
     with np.load(whole / "final.npz") as one, np.load(broken / "final.npz") as other:
-        for name in ("body.nodes.point", "body.auxiliary.point", "body.internals", "body.nodes.displacement"):
+        for name in ("body.nodes.point", "body.nodes.acceleration", "body.internals", "body.nodes.displacement"):
             assert one[name].tobytes() == other[name].tobytes(), name
 
 

@@ -57,9 +57,9 @@ def relaxing(law, size, **numerics):
 @pytest.mark.parametrize(("scheme", "bound"), [("rk4", 2e-7), ("analytic", 1e-12)])
 @pytest.mark.parametrize("size", [(1.0,), (1.0, 0.5), (1.0, 0.5, 0.5)], ids=["bar", "plane strain", "solid"])
 def test_stress_relaxes_and_the_energy_it_loses_is_remembered(scheme, bound, size, precision, maxwell):
-    simulation = Simulation(
-        relaxing(maxwell, size, source_scheme=scheme, time_step=0.1 * TIME), device="cpu", precision=precision
-    )
+    numerics = {"source_scheme": scheme, "velocity_scheme": "taylor" if scheme == "rk4" else "cells"}
+    scene = relaxing(maxwell, size, time_step=0.1 * TIME, **numerics)
+    simulation = Simulation(scene, device="cpu", precision=precision)
     simulation.run()
     bound = max(bound, 20 * np.finfo(precision).eps)
     left = np.exp(-2.0)
@@ -97,9 +97,8 @@ def test_the_step_is_limited_by_what_it_relaxes(maxwell):
     """RK4 sub-steps: λ Δt/2 ≤ 256 · 1.39; the analytic scheme needs no limit."""
     stiff = maxwell.Maxwell(young_modulus=1e6, poisson_ratio=0.3, density=2000.0, relaxation_time=1e-8)
     for scheme, limited in (("rk4", True), ("analytic", False)):
-        scene = Scene(
-            shape=Box((1.0, 0.5), 0.25), material=stiff, duration=1e-3, numerics=Numerics(source_scheme=scheme)
-        )
+        numerics = Numerics(velocity_scheme="taylor", source_scheme=scheme)
+        scene = Scene(shape=Box((1.0, 0.5), 0.25), material=stiff, duration=1e-3, numerics=numerics)
         assert (Simulation(scene, device="cpu").time_step_limit < 1e-5) == limited
 
 
@@ -140,7 +139,7 @@ def test_a_law_that_only_relaxes_runs_with_analytic_sources_and_is_refused_with_
     np.testing.assert_array_equal(*(simulation.field("dissipated_energy") for simulation in simulations))
     assert simulations[0].field("dissipated_energy").min() > 0.0
     with pytest.raises(SceneError, match=r"^source_scheme = 'rk4' .* law of RelaxingOnly takes analytic only$"):
-        Simulation(replace(only, numerics=Numerics(source_scheme="rk4")), device="cpu")
+        Simulation(replace(only, numerics=Numerics(velocity_scheme="taylor", source_scheme="rk4")), device="cpu")
 
 
 @cache
@@ -162,7 +161,7 @@ class Forgetful:
         return _forgetful(super().law(space), space)
 
 
-@pytest.mark.parametrize("velocity_scheme", ["compatible", "taylor"])
+@pytest.mark.parametrize("velocity_scheme", ["cells", "taylor"])
 def test_a_law_that_flows_may_remember_nothing(velocity_scheme, maxwell):
     scene = relaxing(maxwell, (1.0, 0.5), time_step=0.1 * TIME, velocity_scheme=velocity_scheme)
     kind = type("Forgetting", (Forgetful, maxwell.Maxwell), {})

@@ -17,6 +17,7 @@ from warpsph import (
     Elastic,
     Fixed,
     Free,
+    FreeSurface,
     Linear,
     NodeValue,
     Numerics,
@@ -113,7 +114,7 @@ NUMBERS = {
     "Check.bound": (lambda v: Check("c", 1.0, 1.0, "-", v), (-0.1,), "at least 0"),
 }
 OPTIONAL_NUMBERS = {
-    "smoothing_ratio": (lambda v: Numerics(smoothing_ratio=v), (0.0, -0.6), "above 0"),
+    "smoothing_ratio": (lambda v: Numerics(velocity_scheme="taylor", smoothing_ratio=v), (0.0, -0.6), "above 0"),
     "time_step": (lambda v: Numerics(time_step=v), (0.0, -1e-3), "above 0"),
     "Output.interval": (lambda v: Output(interval=v), (-1e-3,), "at least 0"),
 }
@@ -196,8 +197,29 @@ PARTS = [
     (lambda: Table(1.0, 2.0), "Table.times", 1.0, "a sequence of numbers"),
 ]
 NAMES = [
-    (lambda: Numerics(kernel="gausian"), "kernel", "'gausian'", r"one of gaussian.*did you mean gaussian\?"),
-    (lambda: Numerics(kernel=["gaussian"]), "kernel", "['gaussian']", "one of gaussian"),
+    (
+        lambda: Numerics(velocity_scheme="taylor", kernel="gausian"),
+        "kernel",
+        "'gausian'",
+        r"one of gaussian.*did you mean gaussian\?",
+    ),
+    (lambda: Numerics(velocity_scheme="taylor", kernel=["gaussian"]), "kernel", "['gaussian']", "one of gaussian"),
+    (
+        lambda: Numerics(kernel="gaussian"),
+        "kernel",
+        "'gaussian'",
+        "cells takes no sums over neighbours; leave it out",
+    ),
+    (lambda: Numerics(smoothing_ratio=0.6), "smoothing_ratio", 0.6, "cells takes no sums over neighbours"),
+    (lambda: Numerics(sharpening=0.8), "sharpening", 0.8, "at least 0.0 and at most 0.7"),
+    (lambda: Numerics(velocity_scheme="taylor", sharpening=0.0), "sharpening", 0.0, "taylor knows none"),
+    (lambda: Numerics(source_scheme="rk4"), "source_scheme", "'rk4'", "cells takes analytic only"),
+    (
+        lambda: scene(free_surface=FreeSurface()),
+        "free_surface",
+        None,
+        "nobody moves or loads is free; leave it out",
+    ),
     (lambda: Numerics(velocity_scheme="tailor"), "velocity_scheme", "'tailor'", r"did you mean taylor\?"),
     (lambda: Numerics(source_scheme="rk5"), "source_scheme", "'rk5'", r"did you mean rk4\?"),
     (lambda: scene(conditions=[Fixed(edge("lfet"))]), "edge", "'lfet'", r"one of left.*did you mean left\?"),
@@ -360,13 +382,12 @@ def test_message_stays_one_line_when_a_user_function_raises_several():
 
 @pytest.mark.parametrize("shape", [Box((4.0,) * dim, 1.0) for dim in (1, 2, 3)], ids=["1D", "2D", "3D"])
 @pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("scheme", [name for name, scheme in SCHEMES.items() if scheme.stepper is None])
+@pytest.mark.parametrize("scheme", [name for name, scheme in SCHEMES.items() if scheme.sums is not None])
 def test_support_must_reach_the_neighbours_of_a_corner_and_not_too_far(scheme, kernel, shape):
-    """A corner node must see the auxiliary nodes beside its own: r² = (3/2)² + (d − 1)/4; in 1D one is enough. The
-    compatible scheme's sums by parts end at √6.5 spacings."""
+    """A corner node must see the auxiliary nodes beside its own: r² = (3/2)² + (d − 1)/4; in 1D one is enough."""
     dim = len(shape.size)
     least = (1.0 if dim == 1 else math.sqrt(1.5**2 + 0.25 * (dim - 1))) / KERNELS[kernel].support
-    most = (2.55 if scheme == "compatible" and dim > 1 else 6.0) / KERNELS[kernel].support
+    most = 6.0 / KERNELS[kernel].support
 
     def build(ratio):
         return scene(shape=shape, numerics=Numerics(kernel=kernel, smoothing_ratio=ratio, velocity_scheme=scheme))
@@ -379,7 +400,7 @@ def test_support_must_reach_the_neighbours_of_a_corner_and_not_too_far(scheme, k
 
 
 def test_round_support_must_reach_further_on_a_stretched_lattice():
-    """The compatible scheme's kernels are stretched with the cells."""
+    """Cells have no support."""
     long = Box((4.0, 4.0), 1.0).mapped(lambda x, y: (1.5 * x, y))
     round_kernel = Numerics(velocity_scheme="taylor")
     refused(lambda: scene(shape=long, numerics=round_kernel), "smoothing_ratio", 0.6, "must be above")
@@ -389,13 +410,17 @@ def test_round_support_must_reach_further_on_a_stretched_lattice():
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_courant_number_up_to_the_wave_limit(kernel):
-    limit = courant_limit(scene(numerics=Numerics(kernel=kernel)))
+    """2 √m₂ of sums over neighbours; of cells 0.85."""
+    sums = {"velocity_scheme": "taylor", "kernel": kernel}
+    limit = courant_limit(scene(numerics=Numerics(**sums)))
 
     def build(factor):
-        return time_step_limit(scene(numerics=Numerics(kernel=kernel, courant=factor * limit)))
+        return time_step_limit(scene(numerics=Numerics(**sums, courant=factor * limit)))
 
     assert build(1.0) == pytest.approx(limit * 0.25 / Elastic(**ELASTIC).wave_speed(2), rel=1e-12)
     refused(lambda: build(1.001), "courant", limit * 1.001, f"kernel {kernel} .* stable up to {limit:.4g}")
+    too_large = scene(numerics=Numerics(courant=0.86))
+    refused(lambda: time_step_limit(too_large), "courant", 0.86, "cells .* stable up to 0.85")
 
 
 def test_time_step_up_to_the_wave_limit():

@@ -6,19 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from tests.reference.unloading import faces, released
 from warpsph import (
     Box,
-    Elastic,
     Fixed,
     Free,
     Linear,
-    Numerics,
     Polygon,
     PrescribedVelocity,
     Roller,
     Rotating,
-    Scene,
     SceneError,
     edge,
     region,
@@ -420,105 +416,3 @@ def test_normal_of_an_inner_node_must_be_given(condition):
     with pytest.raises(SceneError, match=r"node 4 at \(0\.25, 0\.25\) lies on no selected boundary face"):
         resolve(PLATE.mesh(), [condition(CORE)])
     assert len(resolve(PLATE.mesh(), [condition(CORE, normal=(0.0, 1.0))]).nodes) == 3
-
-
-# ---------------------------------------------------------------------------------------------------------
-# Tractions that vanish by elastic unloading
-# ---------------------------------------------------------------------------------------------------------
-
-ROCK = Elastic(young_modulus=5.0, poisson_ratio=0.35, density=1.0)
-TILTED = {
-    2: [turned(angle, 1, 0) for angle in (0.0, 0.3, 1.2, -2.5)],
-    3: [(1, 0, 0), (0.6, 0.0, 0.8), (0.48, -0.64, 0.6), (-1, -1, 1)],
-}
-
-
-def unloading(shape, conditions, material=ROCK):
-    mesh = shape.mesh()
-    return resolve(mesh, conditions, material.stiffness(mesh.continuum))
-
-
-def energies(a, b, material=ROCK):
-    """2 × the elastic energy of stress a and stress b, tensors (…, 3, 3): a : Dₑ⁻¹ : b."""
-    traces = np.trace(a, axis1=-2, axis2=-1) * np.trace(b, axis1=-2, axis2=-1)
-    both = (a * b).sum(axis=(-2, -1))
-    return ((1.0 + material.poisson_ratio) * both - material.poisson_ratio * traces) / material.young_modulus
-
-
-@pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
-def test_unloading_is_a_projector_orthogonal_in_the_elastic_energy(shape, conditions):
-    """What is taken away does no work on what is left, of any two stresses, and nothing is taken away twice."""
-    table, continuum = unloading(shape, conditions), shape.mesh().continuum
-    for projector in table.stress_projector:
-        assert np.allclose(projector @ projector, projector, atol=1e-12)
-        kept, taken = tensor(projector.T, continuum), tensor((np.eye(len(projector)) - projector).T, continuum)
-        assert np.allclose(energies(kept[:, None], taken[None]), 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
-def test_unloading_and_cutting_off_leave_the_same_tractions_zero(shape, conditions):
-    """Each keeps what the other leaves. All else is as it is: nodes, velocities and what moves them."""
-    unloaded, cut = unloading(shape, conditions), resolve(shape.mesh(), conditions)
-    a, b = unloaded.stress_projector, cut.stress_projector
-    assert np.allclose(a @ b, b, atol=1e-12) and np.allclose(b @ a, a, atol=1e-12)
-    for name in ("nodes", "velocity_projector", "amplitude", "function", "moved"):
-        assert np.array_equal(getattr(unloaded, name), getattr(cut, name))
-
-
-@pytest.mark.parametrize(("shape", "conditions"), SCENES.values(), ids=SCENES.keys())
-def test_without_poisson_s_effect_unloading_is_cutting_off(shape, conditions):
-    cork = Elastic(young_modulus=5.0, poisson_ratio=0.0, density=1.0)
-    unloaded, cut = unloading(shape, conditions, cork), resolve(shape.mesh(), conditions)
-    assert np.allclose(unloaded.stress_projector, cut.stress_projector, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "normals", [n for dim in (2, 3) for r in (1, 2, 3) for n in itertools.combinations(TILTED[dim], r)]
-)
-def test_unloading_is_what_solving_for_the_strains_gives(normals):
-    """On faces with any normals, one, two or three at a node: no traction is left, and strains u n did it."""
-    dim = len(normals[0])
-    shape, continuum = (PLATE, BLOCK)[dim - 2], CONTINUA[dim]
-    units = [np.array(n) / np.linalg.norm(n) for n in normals]
-    table = unloading(shape, [Free(edge("right"), normal=tuple(n)) for n in normals])
-    for unit_stress in np.eye(continuum.stress_size):
-        expected = released(tensor(unit_stress, continuum), faces(units), ROCK.lame_modulus, ROCK.shear_modulus)
-        found = tensor(table.stress_projector[0] @ unit_stress, continuum)
-        assert np.allclose(found, expected, atol=1e-11)
-        assert np.allclose(found[:dim, :dim] @ np.transpose(units), 0.0, atol=1e-11)
-
-
-def test_unloading_a_free_edge_lets_go_of_a_share_of_the_stress_along_it():
-    """σ22 = 2 is taken away by a strain along y, and with it 2 λ/(λ + 2G) of σ11 and σ33."""
-    ratio = ROCK.lame_modulus / (ROCK.lame_modulus + 2.0 * ROCK.shear_modulus)
-    table = unloading(PLATE, [Free(edge("top"))])
-    assert table.stress_projector[0] @ STRESS[2] == pytest.approx([1 - 2 * ratio, 0, 0, 8 - 2 * ratio], abs=1e-12)
-
-
-def test_unloading_at_the_end_of_a_wall_leaves_the_wall_its_pressure():
-    """Roller left, free top: σ22 and the shear go; the wall's σ11 changes elastically, it does not go."""
-    conditions = (Roller(edge("left")), Free(edge("top")))
-    table = unloading(PLATE, conditions)
-    node = np.flatnonzero(np.isclose(PLATE.mesh().nodes, (0.0, 0.5)).all(axis=1))[0]
-    stress = tensor(table.stress_projector[table.nodes.tolist().index(node)] @ STRESS[2], CONTINUA[2])
-    x, y = np.eye(2)
-    start = tensor(np.array(STRESS[2]), CONTINUA[2])
-    expected = released(start, [(y, x), (y, y)], ROCK.lame_modulus, ROCK.shear_modulus)
-    assert np.allclose(stress, expected, atol=1e-12)
-    assert stress[0, 0] != 0.0
-
-
-def test_an_edge_without_a_condition_is_free_where_tractions_are_released():
-    """With a published scheme it keeps whatever traction it has."""
-    common = {
-        "shape": PLATE,
-        "material": ROCK,
-        "duration": 1.0,
-        "conditions": [Roller(edge("left")), Fixed(edge("bottom"))],
-    }
-    named = Scene(**common | {"conditions": [*common["conditions"], Free(edge("top") | edge("right"))]})
-    bare = Scene(**common)
-    for name in ("nodes", "stress_projector", "velocity_projector"):
-        assert np.allclose(getattr(bare.boundary, name), getattr(named.boundary, name), atol=1e-12)
-    published = Scene(**common, numerics=Numerics(velocity_scheme="taylor"))
-    assert published.boundary.nodes.tolist() == resolve(PLATE.mesh(), common["conditions"]).nodes.tolist()

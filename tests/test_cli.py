@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from warpsph import *
 
-NUMERICS = {{"courant": 1}}
+NUMERICS = {{"velocity_scheme": "taylor", "courant": 1}}
 PARAMETERS = (
     Parameter("duration", 0.005, "s", "simulated time"),
     Parameter("cells", 10, "-", "number of cells"),
@@ -389,7 +389,7 @@ def test_no_progress_bar_where_output_is_no_terminal(user_file, tmp_path):
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"\r" not in done.stdout and b"%" not in done.stdout
     lines = done.stdout.decode().splitlines()
-    assert lines[0].startswith("mine: 11 nodes, 10 auxiliary nodes, float64 on cpu, time step 0.0005 s")
+    assert lines[0].startswith("mine: 11 nodes, 10 cells, float64 on cpu, time step 0.0005 s")
     assert lines[1].startswith("10 steps to t = 0.005 s")
 
 

@@ -57,8 +57,9 @@ def random_state(kind, jitter=0.3, **more):
 
 
 def tensors(simulation):
-    """Stresses as d × d matrices."""
-    stress, d = simulation.field("stress"), simulation.mesh.dim
+    """The stresses that are strained, as d × d matrices."""
+    d = simulation.mesh.dim
+    stress = simulation.nodes.point.numpy()["phi"][:, d:]
     full = np.zeros((len(stress), d, d))
     for k, (i, j) in enumerate(simulation.mesh.continuum.pairs):
         if max(i, j) < d:
@@ -188,11 +189,8 @@ def test_soil_at_rest_stays_at_rest(kind, damping):
     assert reaction.sum() == pytest.approx(2000.0 * 9.81 * 0.5, rel=1e-10)
 
 
-@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered"])
-@pytest.mark.parametrize("kind", ["quads", "triangles", "hexahedra", "tetrahedra"])
-@pytest.mark.parametrize("poisson", [-0.5, 0.3, 0.49])
-def test_noise_does_not_grow(kind, shape, poisson):
-    """5000 steps of a clamped body from random velocities: what is left is no more than was put in."""
+def noisy(kind, shape, poisson):
+    """A clamped body with random velocities."""
     dim, name = BODIES[kind]
     box = Box((4.0,) * dim, 1.0, cells=name)
     rng = np.random.default_rng(2)
@@ -205,6 +203,7 @@ def test_noise_does_not_grow(kind, shape, poisson):
         "flat": lambda x, *y: (10.0 * x, *y),
         "leaning": lambda x, y, *z: (x + 2.0 * y, y, *z),
         "jittered": jittered,
+        "quarter disc": lambda x, y, *z: (x * np.sqrt(1.0 - y**2 / 32.0), y * np.sqrt(1.0 - x**2 / 32.0), *z),
     }[shape]
     scene = Scene(
         shape=box.mapped(mapped),
@@ -215,11 +214,37 @@ def test_noise_does_not_grow(kind, shape, poisson):
         duration=1.0,
         numerics=NUMERICS,
     )
-    simulation = Simulation(scene, device="cpu")
-    mass = simulation.nodes.mass.numpy()[:, None]
-    start = (mass * simulation.field("velocity") ** 2).sum()
+    return Simulation(scene, device="cpu")
+
+
+def kinetic_energy(simulation):
+    return 0.5 * (simulation.nodes.mass.numpy()[:, None] * simulation.field("velocity") ** 2).sum()
+
+
+SOLIDS, POISSON = ("quads", "triangles", "hexahedra", "tetrahedra"), (-0.5, 0.3, 0.49)
+
+
+@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "quarter disc"])
+@pytest.mark.parametrize("kind", SOLIDS)
+@pytest.mark.parametrize("poisson", POISSON)
+def test_noise_does_not_grow(kind, shape, poisson):
+    """5000 steps from random velocities: what is left is no more than was put in."""
+    simulation = noisy(kind, shape, poisson)
+    start = kinetic_energy(simulation)
     simulation.run(until=5000 * simulation.time_step_limit)
-    assert (mass * simulation.field("velocity") ** 2).sum() <= start
+    assert kinetic_energy(simulation) <= start
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "quarter disc"])
+@pytest.mark.parametrize("kind", SOLIDS)
+@pytest.mark.parametrize("poisson", POISSON)
+def test_noise_does_not_grow_in_a_hundred_thousand_steps(kind, shape, poisson):
+    simulation = noisy(kind, shape, poisson)
+    simulation.run(until=1000 * simulation.time_step_limit)
+    left = kinetic_energy(simulation)
+    simulation.run(until=100_000 * simulation.time_step_limit)
+    assert kinetic_energy(simulation) <= left
 
 
 def test_energy_is_accounted_for_where_soil_flows():
@@ -284,9 +309,6 @@ def test_what_the_scheme_has_not_is_refused_in_one_line():
     loaded = Scene(**scene, numerics=NUMERICS, conditions=[Fixed(edge("bottom")), Pulled(edge("top"))])
     with pytest.raises(SceneError, match="cells takes no tractions"):
         Simulation(loaded, device="cpu")
-    rk4 = Scene(**scene, numerics=Numerics(velocity_scheme="cells", source_scheme="rk4"))
-    with pytest.raises(SceneError, match="cells takes analytic only"):
-        Simulation(rk4, device="cpu")
 
 
 class Tip:
@@ -357,6 +379,7 @@ def test_elastic_flag_swings_and_comes_back():
 def test_time_step_follows_cells_that_are_pressed():
     """Uniaxial strain to four fifths of the height, slowly: squares become 5 : 4, and Δx is their height.
 
+    A cell's mass and its stiffness stay, so that waves get slower by √(4/5), and a step is √(4/5) of the first.
     It is measured anew every 2 % of strain; waves of the press itself strain by v/c_p = 0.5 %.
     """
     scene = Scene(
@@ -373,4 +396,4 @@ def test_time_step_follows_cells_that_are_pressed():
     start = simulation.time_step_limit
     simulation.run()
     assert simulation.field("position")[:, 1].max() == pytest.approx(0.8, abs=1e-9)
-    assert simulation.time_step_limit / start == pytest.approx(0.8, abs=0.03)
+    assert simulation.time_step_limit / start == pytest.approx(np.sqrt(0.8), abs=0.015)

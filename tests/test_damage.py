@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from tests.test_restart import resumed, slope, started
+from tests.test_restart import SCENES, resumed, started
 from warpsph import SceneError
 from warpsph.errors import DamagedError
 from warpsph.simulation.checkpoint import Checkpoint, seal, write_checkpoint
@@ -27,11 +27,14 @@ def test_damaged_files_are_refused_in_one_line_and_nothing_is_lost(count, seed, 
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("saved")
-    simulation, history = started(slope(), "float64", folder)
-    simulation.run(until=0.1)
-    write_checkpoint(simulation, folder / "checkpoint.npz", history)
-    return folder
+    """A folder with a checkpoint of each scene, by the scene's name."""
+    folders = {}
+    for name in ("slope", "published slope"):
+        folder = folders[name] = tmp_path_factory.mktemp("saved")
+        simulation, history = started(SCENES[name](), "float64", folder)
+        simulation.run(until=0.1)
+        write_checkpoint(simulation, folder / "checkpoint.npz", history)
+    return folders
 
 
 def forged(saved, folder, name, change):
@@ -58,35 +61,38 @@ def nan(values):
 
 
 @pytest.mark.parametrize(
-    ("ending", "change", "message"),
+    ("scene", "ending", "change", "message"),
     [
-        ("nodes.density", lambda v: v[:-1], r"nodes.density has shape \(\d+,\)"),
-        ("nodes.density", lambda v: v.astype(np.float32), "nodes.density is of type float32"),
-        ("nodes.density", nan, "nodes.density is not finite everywhere"),
-        ("auxiliary.cell", out_of_range, "auxiliary.cell leads out of its table"),
-        ("pairs.index", out_of_range, "pairs leads out of its table"),
-        ("pairs.start", out_of_range, "pairs leads out of its list"),
-        ("pairs.index", lambda v: v[:3], "pairs leads out of its list"),
-        ("around_nodes.index", out_of_range, "leads out of its table"),
-        ("around_auxiliary.index", out_of_range, "leads out of its table"),
-        ("table.row", out_of_range, "row leads out of its table"),
+        ("slope", "nodes.mass", lambda v: v[:-1], r"nodes.mass has shape \(\d+,\)"),
+        ("slope", "nodes.mass", lambda v: v.astype(np.float32), "nodes.mass is of type float32"),
+        ("slope", "nodes.mass", nan, "nodes.mass is not finite everywhere"),
+        ("slope", "body.corners", out_of_range, "corners leads out of its table"),
+        ("slope", "node_cells.place", out_of_range, "place leads out of its table"),
+        ("slope", "conditions.row", out_of_range, "row leads out of its table"),
+        ("published slope", "auxiliary.cell", out_of_range, "auxiliary.cell leads out of its table"),
+        ("published slope", "pairs.index", out_of_range, "pairs leads out of its table"),
+        ("published slope", "pairs.start", out_of_range, "pairs leads out of its list"),
+        ("published slope", "pairs.index", lambda v: v[:3], "pairs leads out of its list"),
+        ("published slope", "around_nodes.index", out_of_range, "leads out of its table"),
+        ("published slope", "around_auxiliary.index", out_of_range, "leads out of its table"),
+        ("published slope", "table.row", out_of_range, "row leads out of its table"),
     ],
 )
-def test_forged_checkpoint_is_refused_before_a_kernel_follows_it(ending, change, message, saved, tmp_path):
-    with np.load(saved / "checkpoint.npz") as file:
+def test_forged_checkpoint_is_refused_before_a_kernel_follows_it(scene, ending, change, message, saved, tmp_path):
+    with np.load(saved[scene] / "checkpoint.npz") as file:
         names = [name for name in file.files if name.endswith(ending)]
     assert names
     for name in names:
-        forged(saved, tmp_path, name, change)
+        forged(saved[scene], tmp_path, name, change)
         with pytest.raises(SceneError, match=message):
-            resumed(slope(), "float64", tmp_path)
+            resumed(SCENES[scene](), "float64", tmp_path)
 
 
 def test_checkpoint_whose_arrays_are_another_s_is_refused(saved, tmp_path):
     """Every checksum of the archive fits; only the digest over all of it tells."""
-    with np.load(saved / "checkpoint.npz") as file:
+    with np.load(saved["slope"] / "checkpoint.npz") as file:
         content = dict(file)
-    name = next(name for name in content if name.endswith("nodes.density"))
+    name = next(name for name in content if name.endswith("nodes.mass"))
     content[name] = content[name] * 1.001
     np.savez(tmp_path / "checkpoint.npz", **content)
     with pytest.raises(DamagedError, match="it is not what was written"):

@@ -1,6 +1,8 @@
 """Cases that break a scheme which is only right on a lattice at rest: default settings, unless the case is
 a setting."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,6 @@ from warpsph import (
     Elastic,
     Fixed,
     Free,
-    FreeSurface,
     Numerics,
     PerzynaVonMises,
     PrescribedVelocity,
@@ -23,10 +24,8 @@ from warpsph import (
     region,
 )
 from warpsph.cli.catalogue import load
-from warpsph.operators.checkerboard import STRESS_SHARE
-from warpsph.step.compatible import VELOCITY_SHARE
 
-from .motions import SOFT, Energies, hanging_bar, return_error, standing_mode
+from .motions import SOFT, Energies, return_error, standing_mode
 
 
 def run_with_energy(scene, every=1, observe=lambda simulation: None, bending=False):
@@ -42,14 +41,15 @@ def run_with_energy(scene, every=1, observe=lambda simulation: None, bending=Fal
 def test_nearly_incompressible_body_does_not_lock(kind):
     """ν = 0.499. Both modes keep their volume, so ν enters by the number of steps only: c_p/c_s = 22.4.
 
-    A step takes the checkerboard off velocity and stress, s⁴ of the mode with s = sin(kΔ/2), each while it
-    has half of the energy. On top, the dispersion of the same mode with ν = 0.3. Locking would multiply the
-    frequency. With 20 cells measured 0.043 of 0.048 (S) and 0.065 of 0.104 (Lamé).
+    The rough viscosity sees div v at the corners of cells, of which nodes see nothing: with s = sin(kΔ/2) the
+    hourglass modes have s² of the amplitude, and div² v is 2 s⁴/Δ² in the mean. With η = Δ²/(8 c_p² Δt) and
+    λ ≈ ρ c_p² that takes s⁴/4 of the amplitude a step. On top, the dispersion of the same mode with ν = 0.3.
+    Locking would multiply the frequency. With 20 cells measured 0.018 of 0.021 (S) and 0.037 of 0.058 (Lamé).
     """
     material = Elastic(young_modulus=1e6, poisson_ratio=0.499, density=1000.0)
     scene = standing_mode(kind, 20, material=material)
     steps = scene.duration / (0.8 * 0.05 / material.wave_speed(2))
-    taken = 0.5 * (VELOCITY_SHARE + STRESS_SHARE) * np.sin(np.pi / 40) ** 4 * steps
+    taken = 0.25 * np.sin(np.pi / 40) ** 4 * steps
     assert return_error(scene) <= taken + return_error(standing_mode(kind, 20))
 
 
@@ -68,11 +68,10 @@ def jittered(cells, origin):
 
 @pytest.mark.parametrize("kind", ["S", "P", "Lamé"])
 def test_jittered_nodes_cost_some_accuracy_and_no_stability(kind):
-    """±20 % Δx: of first order, since a mean over a jittered cell is exact for linear fields only, no longer for
-    the lattice's bilinear ones. That takes energy off, and must never add any.
+    """±20 % Δx: nearly of second order all the same. Energy must never grow.
 
-    Measured at 20 / 40 cells: S 0.062 / 0.030, P 0.071 / 0.037, Lamé below 0.13 (even nodes: 0.011, 0.021,
-    0.059). First order halves the error; allowed are a tenth more.
+    Measured at 20 / 40 cells without sharpening: S 0.0091 / 0.0016, P 0.0118 / 0.0027, Lamé 0.047 / 0.012.
+    An order of 3/2 is asked for.
     """
     origin, errors = (-0.5, -0.5) if kind == "Lamé" else (0.0, 0.0), []
     for cells in (20, 40):
@@ -81,7 +80,7 @@ def test_jittered_nodes_cost_some_accuracy_and_no_stability(kind):
         start = scene.initial_velocity
         errors.append(np.linalg.norm(simulation.field("velocity") - start) / np.linalg.norm(start))
         assert energies.total.max() <= energies.total[0] * (1.0 + 1e-6)
-    assert errors[0] <= (0.13 if kind == "Lamé" else 0.08) and errors[1] <= 0.55 * errors[0], errors
+    assert errors[0] <= (0.05 if kind == "Lamé" else 0.013) and errors[1] <= 0.35 * errors[0], errors
 
 
 @pytest.mark.parametrize("kind", ["S", "P", "Lamé"])
@@ -90,7 +89,7 @@ def test_jittered_nodes_are_stable_for_fifty_periods(kind):
     e-fold."""
     origin = (-0.5, -0.5) if kind == "Lamé" else (0.0, 0.0)
     shape = jittered(10, origin)
-    _, energies = run_with_energy(standing_mode(kind, 10, 50.0, shape=shape, smoothing_ratio=0.8), every=7)
+    _, energies = run_with_energy(standing_mode(kind, 10, 50.0, shape=shape), every=7)
     parts = [part.max() for part in np.array_split(energies.total, 50)]
     assert np.diff(parts).max() <= 0.0
 
@@ -192,8 +191,7 @@ def momenta(simulation):
     return *(m @ v), m @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
 
 
-@pytest.mark.parametrize("free_surface", [None, FreeSurface()])
-def test_free_square_keeps_spinning_as_it_does(free_surface):
+def test_free_square_keeps_spinning_as_it_does():
     """Nothing acts on it: linear momentum stays zero to rounding, angular momentum and energy to 1 % in two turns.
 
     They need not be exact: the square bulges by 1.5 % and swings, and its edges' normals are fitted, or
@@ -201,7 +199,7 @@ def test_free_square_keeps_spinning_as_it_does(free_surface):
     lagged by half a degree would leave a traction along the edge and add 6 % to the angular momentum;
     measured 4·10⁻⁴ and 7·10⁻³.
     """
-    simulation, energies = run_with_energy(spinning(10, 2.0, free_surface=free_surface), observe=momenta)
+    simulation, energies = run_with_energy(spinning(10, 2.0), observe=momenta)
     along_x, along_y, angular = np.array(energies.also).T
     scale = simulation.field("mass").sum() * 2.5
     assert max(np.abs(along_x).max(), np.abs(along_y).max()) <= 1e-10 * scale
@@ -249,7 +247,6 @@ def test_strip_pulled_almost_to_the_end_of_its_material():
         shape=Box((1.0, 0.5), 0.0625),
         material=SOFT,
         conditions=[Roller(edge("left")), PrescribedVelocity(edge("right"), (speed, None))],
-        free_surface=FreeSurface(),
         velocity=lambda x, y: (speed * x, -3.0 / 7.0 * speed * y),
         duration=(stretch - 1.0) / speed,
     )
@@ -304,10 +301,11 @@ def test_extreme_flow_rules_at_the_waves_time_step(fluidity, exponent):
 
 def test_fluidity_near_zero_is_elasticity():
     """γ = 10⁻⁶: flow takes γ t (q/Y − 1) = 7·10⁻⁶ of a strain of 0.1 (q up to 52 Y in 0.27 s), so 10⁻⁴ of
-    the stress."""
+    the stress. Without sharpening, which ends where soil flows, however slowly."""
     material = PerzynaVonMises(**ELASTIC, fluidity=1e-6, yield_size=2e3)
     flowing, elastic = (
-        run_with_energy(pressed_block(m), 10)[0].field("stress") for m in (material, Elastic(**ELASTIC))
+        run_with_energy(replace(pressed_block(m), numerics=Numerics(sharpening=0.0)), 10)[0].field("stress")
+        for m in (material, Elastic(**ELASTIC))
     )
     assert np.abs(flowing - elastic).max() <= 1e-4 * np.abs(elastic).max()
 
@@ -328,9 +326,8 @@ def test_needle_two_cells_wide_rings_along_its_axis():
     assert return_error(scene) <= 5e-3
 
 
-@pytest.mark.parametrize("free_surface", [None, FreeSurface()])
 @pytest.mark.parametrize("gravity", [0.0005, 0.05])
-def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surface):
+def test_needle_two_cells_wide_bends_without_gaining_energy(gravity):
     """A cantilever 40 cells long, small and large (0.06 L) deflections, half a period: total energy, zero
     at the start.
 
@@ -341,7 +338,6 @@ def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surfac
         shape=Box((1.0, 0.05), 0.025),
         material=SOFT,
         conditions=[Fixed(edge("left"))],
-        free_surface=free_surface,
         body_force=BodyForce((0.0, -gravity)),
         duration=2.0,
     )
@@ -351,17 +347,7 @@ def test_needle_two_cells_wide_bends_without_gaining_energy(gravity, free_surfac
     assert -0.5 * gravity * 2.0**2 * 1.6 <= simulation.field("displacement")[:, 1].min() < 0.0
 
 
-@pytest.mark.parametrize(
-    ("kernel", "ratio"), [("gaussian", 0.53), ("cubic_spline", 0.8), ("wendland_c2", 0.8), ("gaussian", 0.85)]
-)
-def test_smallest_and_largest_supports_swing_without_growing(kernel, ratio):
-    """The smallest supports allowed, and the largest (2.55 Δx): beyond, edges know no summation by parts."""
-    _, energies = run_with_energy(hanging_bar(10, 10, kernel=kernel, smoothing_ratio=ratio), every=3)
-    assert energies.total.max() <= 0.05 * max(energies.elastic)
-    assert return_error(standing_mode("S", 20, kernel=kernel, smoothing_ratio=ratio)) <= 0.03
-
-
-@pytest.mark.parametrize("scheme", ["blanc-pastor", "compatible"])
+@pytest.mark.parametrize("scheme", ["blanc-pastor", "cells"])
 def test_column_that_yields_at_its_foot_comes_to_rest(scheme):
     """On a smooth base, whose lowest fifth is loaded beyond Y: the soil above holds it together, as it has to.
 

@@ -134,14 +134,17 @@ def part(kind, right, name):
     return lambda value: kind(**{**right, name: value})
 
 
-def in_scene(name, build=lambda value: value):
+SUMS = Numerics(velocity_scheme="taylor")
+
+
+def in_scene(name, build=lambda value: value, numerics=SUMS):
     """A builder of a scene that is right but for one argument, made by `build`."""
     right = {
         "shape": PLATE,
         "material": Elastic(**ELASTIC),
         "duration": 1.0,
         "conditions": [Fixed(edge("bottom"))],
-        "numerics": Numerics(),
+        "numerics": numerics,
     }
     return lambda value: Scene(**{**right, name: build(value)})
 
@@ -213,7 +216,7 @@ WRONG = {
         {"spacing"},
     ),
     "thin": (
-        in_scene("shape", lambda v: Box((1.0, v, 1.0), v)),
+        in_scene("shape", lambda v: Box((1.0, v, 1.0), v), Numerics()),
         st.sampled_from([0.5, 0.25, 0.125]),
         {"spacing"},
     ),
@@ -267,11 +270,15 @@ WRONG = {
     "body_force": (in_scene("body_force"), nothing_of_ours, {"body_force"}),
     "acceleration": (in_scene("body_force", BodyForce), no_vectors, {"BodyForce.acceleration"}),
     "factor": (part(BodyForce, {"acceleration": (0.0, 1.0)}, "factor"), no_time_functions, {"BodyForce.factor"}),
-    "kernel": (part(Numerics, {}, "kernel"), no_names, {"kernel"}),
+    "kernel": (
+        part(Numerics, {"velocity_scheme": "taylor"}, "kernel"),
+        no_names.filter(lambda v: v is not None),
+        {"kernel"},
+    ),
     "velocity_scheme": (part(Numerics, {}, "velocity_scheme"), no_names, {"velocity_scheme"}),
-    "source_scheme": (part(Numerics, {}, "source_scheme"), no_names, {"source_scheme"}),
+    "source_scheme": (part(Numerics, {"velocity_scheme": "taylor"}, "source_scheme"), no_names, {"source_scheme"}),
     "smoothing_ratio": (
-        in_scene("numerics", lambda v: Numerics(smoothing_ratio=v)),
+        in_scene("numerics", lambda v: Numerics(velocity_scheme="taylor", smoothing_ratio=v)),
         st.one_of(not_positive.filter(lambda v: v is not None), st.floats(0.01, 0.5), st.floats(2.1, 1e9)),
         {"smoothing_ratio"},
     ),
@@ -440,6 +447,7 @@ def document():
                 PrescribedVelocity(edge("top"), (None, Table((0.0, 1.0), (0.0, 1.0)))),
             ],
             free_surface=FreeSurface(),
+            numerics=Numerics(velocity_scheme="taylor"),
             body_force=BodyForce((0.0, -9.81), Ramp(0.5)),
             velocity=lambda x, y: (0.0, 0.01),
             duration=1.0,

@@ -53,8 +53,9 @@ SCENES = {
     "published, free surface": lambda: pressed(
         numerics=Numerics(velocity_scheme="blanc-pastor"), free_surface=FreeSurface()
     ),
-    "free surface": lambda: pressed(free_surface=FreeSurface()),
-    "RK4, small displacements": lambda: pressed(large_displacements=False, numerics=Numerics(source_scheme="rk4")),
+    "RK4, small displacements": lambda: pressed(
+        large_displacements=False, numerics=Numerics(velocity_scheme="taylor", source_scheme="rk4")
+    ),
 }
 STATE = ("position", "velocity", "stress", "equivalent_plastic_strain", "density")
 
@@ -92,7 +93,7 @@ class Late:
 @pytest.mark.parametrize("name", SCENES)
 def test_threads_do_not_change_a_bit(name, precision):
     one = state_after(Simulation(SCENES[name](), device="cpu", precision=precision, threads=1))
-    if name != "RK4, small displacements":
+    if "free surface" in name:
         assert one[2] > 1, "lists are to be rebuilt on the way"
     for threads in (2, 3):
         simulation = Simulation(SCENES[name](), device="cpu", precision=precision, threads=threads)
@@ -116,7 +117,8 @@ def test_a_driver_without_loops_makes_the_same_steps(monkeypatch):
 
 def test_one_recording_serves_every_time_step(device):
     """Δt is on the device: steps of other lengths are replayed, as are those after lists were built in place."""
-    replayed, made_one_by_one = (Simulation(pressed(), device, threads=1) for _ in range(2))
+    published = Numerics(velocity_scheme="blanc-pastor")
+    replayed, made_one_by_one = (Simulation(pressed(numerics=published), device, threads=1) for _ in range(2))
     replayed.step()
     recording = replayed.stepper._recording
     for share in (1.0, 0.3, 0.7):

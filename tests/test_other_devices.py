@@ -7,16 +7,18 @@ import warp as wp
 from tests.test_launching import SCENES, STATE, pressed
 from warpsph import Numerics, Simulation
 from warpsph.device.arrays import ALIGNMENT
+from warpsph.operators.cell_limit import CellLimit
 from warpsph.operators.conditions import Conditions
 from warpsph.operators.neighbour_sums import GPU_BATCH
 from warpsph.operators.surface.release import FreeSurfaceConditions
 from warpsph.simulation.state import slots
-from warpsph.step import compatible, lists, published, sums
+from warpsph.step import cells, lists, published, sums
 
 HOPPER = 90  # compute capability 9.0
-# Two have every kernel of both families of schemes; the others are variants of them.
+# These two have every kernel of both families of schemes; the others are variants of them.
+SHORT = ("default", "published, free surface")
 COMPILED = [
-    pytest.param(name, precision, marks=[pytest.mark.long] if "free surface" not in name else [])
+    pytest.param(name, precision, marks=[] if name in SHORT else [pytest.mark.long])
     for name, precision in [*((name, "float32") for name in SCENES), ("solid", "float64")]
 ]
 
@@ -24,9 +26,7 @@ COMPILED = [
 @pytest.fixture
 def as_on_a_gpu(monkeypatch):
     """Simulations made now have the kernels and the layout of a GPU, wherever they run."""
-    monkeypatch.setattr(compatible, "batch_on", lambda device: GPU_BATCH)
     monkeypatch.setattr(published, "batch_on", lambda device: GPU_BATCH)
-    monkeypatch.setattr(compatible, "numbers_side_by_side", lambda device: True)
 
 
 @pytest.mark.skipif(HOPPER not in wp.get_cuda_supported_archs(), reason="this Warp can not compile for CUDA")
@@ -34,10 +34,11 @@ def as_on_a_gpu(monkeypatch):
 def test_all_kernels_compile_for_cuda(as_on_a_gpu, name, precision, monkeypatch, tmp_path):
     """To machine code, which needs no driver."""
     kernels = []
-    for module in (sums, lists):
+    for module in (cells, sums, lists):
         monkeypatch.setattr(module, "load_kernels", lambda of_step, device: kernels.extend(of_step))
-    for part in (lists.PairLists, Conditions, FreeSurfaceConditions):
+    for part in (CellLimit, lists.PairLists, Conditions, FreeSurfaceConditions):
         monkeypatch.setattr(part, "refresh", lambda self: None)
+    monkeypatch.setattr(cells.CellStepper, "step", lambda self: None)
     monkeypatch.setattr(sums.SumsStepper, "_initial_spin", lambda self, scene: None)
     Simulation(SCENES[name](), "cpu", precision)
     modules = {kernel.module for kernel in kernels}
@@ -49,9 +50,9 @@ def test_all_kernels_compile_for_cuda(as_on_a_gpu, name, precision, monkeypatch,
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_layout_of_a_gpu_gives_the_same(precision, dim, request):
     """On one thread of the CPU; sums are added up in the same order, by code that may round otherwise."""
-    runs = []
+    runs, numerics = [], Numerics(velocity_scheme="blanc-pastor")
     for _ in range(2):
-        simulation = Simulation(pressed(dim), "cpu", precision, threads=1)
+        simulation = Simulation(pressed(dim, numerics=numerics), "cpu", precision, threads=1)
         simulation.run(0.02)
         runs.append({name: simulation.field(name) for name in STATE})
         request.getfixturevalue("as_on_a_gpu")
@@ -60,7 +61,7 @@ def test_the_layout_of_a_gpu_gives_the_same(precision, dim, request):
         assert np.abs(runs[1][name] - expected).max() <= rounding * np.abs(expected).max(), name
 
 
-@pytest.mark.parametrize("scheme", ["compatible", "blanc-pastor"])
+@pytest.mark.parametrize("scheme", ["cells", "blanc-pastor"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, scheme):
     """Also of those that a restored state brought along."""
@@ -74,12 +75,13 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
         "body.node_cells.",
         "lists._auxiliary.",
         "lists._nodes.",
-        "fluxes._cells",
+        "_numbers",
+        "_forces",
+        "_means.",
     )
     every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}
-    assert len(arrays) > 20
+    assert len(arrays) > 15
     for path, array in arrays.items():
-        cells_together = path == "fluxes._cells" and array.device.is_cpu
         assert array.ptr % ALIGNMENT == 0, path
-        assert (array.transpose() if cells_together else array).is_contiguous, path
+        assert array.is_contiguous, path

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from warpsph import Box, Elastic, FreeSurface, PrescribedVelocity, Scene, Simulation, edge
+from warpsph import Box, Elastic, PrescribedVelocity, Scene, Simulation, edge
 from warpsph.cli.main import main
 from warpsph.frames import Frames, FrameWriter, evenly
 
@@ -26,7 +26,6 @@ def run(request, tmp_path):
         material=Elastic(young_modulus=8e7, poisson_ratio=0.3, density=2000.0),
         conditions=[PrescribedVelocity(edge("left"), (-1.0, None, None)[:dim])],
         stress=lambda x, *rest: STRESS[dim],
-        free_surface=FreeSurface() if dim > 1 else None,
         duration=2e-3,
     )
     simulation = Simulation(scene, device="cpu")

@@ -42,18 +42,23 @@ SOIL = PerzynaVonMises(
 
 
 def slope(**changed):
-    """A soft slope that flows: free surface, gravity, damping, flow, large displacements."""
+    """A soft slope that flows: gravity, damping, flow, large displacements."""
     parts = {
         "shape": Box((1.2, 0.6), 0.1),
         "material": SOIL,
         "conditions": [Roller(edge("left")), Roller(edge("bottom"))],
-        "free_surface": FreeSurface(),
         "body_force": BodyForce((0.0, -9.81), Ramp(0.5)),
         "damping": 2.0,
         "duration": 1.0,
         "output": Output(interval=0.013, probes=(Probe("toe", "m", NodeValue("displacement", (1.2, 0.0))),)),
     }
     return Scene(**(parts | changed))
+
+
+def published_slope():
+    """The same by sums over neighbours, with RK4 sources and a moving free surface."""
+    numerics = Numerics(velocity_scheme="blanc-pastor", source_scheme="rk4")
+    return slope(free_surface=FreeSurface(), numerics=numerics)
 
 
 def footing():
@@ -81,7 +86,7 @@ def wheel():
     )
 
 
-SCENES = {"slope": slope, "footing": footing, "wheel": wheel}
+SCENES = {"slope": slope, "published slope": published_slope, "footing": footing, "wheel": wheel}
 
 
 class StopError(Exception):
@@ -172,7 +177,8 @@ def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(name, precision, tmp_p
     (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
     whole, history = started(scene, precision, tmp_path / "a")
     finish(whole, history)
-    assert whole.list_builds > 2, "the scene must rebuild its lists on the way"
+    if scene.numerics.scheme.sums is not None:
+        assert whole.list_builds > 2, "the scene must rebuild its lists on the way"
 
     simulation, history = started(scene, precision, tmp_path / "b")
     for stop in (whole.steps // 3, whole.steps // 2 + 1):
@@ -250,8 +256,8 @@ def refusal(folder, scene=None, precision="float64"):
         {"stress": lambda x, y: (0.0, 0.0, 0.0, 1e-9)},
         {"damping": 2.1},
         {"duration": 1.1},
-        {"free_surface": FreeSurface(normals="marrone")},
-        {"numerics": Numerics(kernel="wendland_c2")},
+        {"free_surface": FreeSurface(), "numerics": Numerics(velocity_scheme="taylor")},
+        {"numerics": Numerics(velocity_scheme="taylor", kernel="wendland_c2")},
         {"numerics": Numerics(time_step=1e-4)},
         {"output": Output(interval=0.013)},
         {"output": Output(interval=0.014, probes=slope().output.probes)},

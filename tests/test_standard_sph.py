@@ -22,7 +22,8 @@ def lattice_in_tension(stress, displaced=lambda x, y: (0.0 * x, 0.0 * y)):
             material=SOFT,
             stress=lambda x, y: (stress, stress, 0.0, 0.0),
             duration=1.0,
-        )
+        ),
+        SMOOTHING / SPACING,
     )
 
 

@@ -7,7 +7,7 @@ import warp as wp
 from warpsph import Box, Disc, Elastic, Numerics, Scene, Simulation
 from warpsph.device.linear_algebra import symmetric_inverse
 from warpsph.device.precision import PRECISIONS
-from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, neighbour_sums, round_metric
+from warpsph.operators.neighbour_sums import CPU_BATCH, GPU_BATCH, neighbour_sums
 from warpsph.operators.sources import STRESS_INTEGRATORS as SOURCE_TABLE
 from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA, KERNELS, SOURCE_SCHEMES
@@ -68,7 +68,6 @@ def probe_kernel(dim, precision, kernel, batch):
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
     types, parts = space.types, neighbour_sums(space, KERNELS[kernel], batch)
-    metric_of = round_metric(space)
     Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -84,7 +83,7 @@ def probe_kernel(dim, precision, kernel, batch):
         gradients: wp.array(dtype=matrix),
     ):
         i = wp.tid()
-        sums = parts.collect(i, x[i], metric_of(h[i]), base, pairs, sources, volume)
+        sums = parts.collect(i, x[i], h[i], base, pairs, sources, volume)
         values[i] = parts.value(sums)
         gradients[i] = parts.gradient(sums, own[i])
 

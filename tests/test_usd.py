@@ -39,7 +39,6 @@ def scene(p):
             Fixed(edge("{low}")), PrescribedVelocity(edge("{high}"), {velocity}), Roller(edge("left"))
         ][:{n}],
         body_force=BodyForce({gravity}),
-        free_surface={surface},
         duration=p.duration,
         numerics=p.numerics,
         output=Output(field="displacement", component=0),
@@ -52,7 +51,6 @@ SCENES = {
         "high": "right",
         "velocity": (-1.0,),
         "gravity": (0.0,),
-        "surface": None,
         "n": 2,
     },
     2: {
@@ -61,7 +59,6 @@ SCENES = {
         "high": "top",
         "velocity": (None, -1.0),
         "gravity": (0.0, -9.81),
-        "surface": "FreeSurface()",
         "n": 3,
     },
     3: {
@@ -70,7 +67,6 @@ SCENES = {
         "high": "top",
         "velocity": (None, None, -1.0),
         "gravity": (0.0, 0.0, -9.81),
-        "surface": "FreeSurface()",
         "n": 3,
     },
 }

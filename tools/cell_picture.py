@@ -17,6 +17,7 @@ from warpsph.export.pictures.figures import BRIGHT, DARK, GREY, new_figure
 
 PATH = Path(__file__).resolve().parent.parent / "docs" / "images" / "cell.svg"
 SIZE = (5, 4)  # of the body [cells]
+SUPPORT = Numerics(velocity_scheme="blanc-pastor").support  # [Δx]
 SHOWN = 9  # the cell that is looked at
 INWARDS = 0.3  # where a corner's number stands, from the corner towards the middle
 STYLE = {"svg.fonttype": "none", "svg.hashsalt": "warpsph", "font.family": "sans-serif"}
@@ -41,17 +42,17 @@ def draw(axes) -> None:
         )
     )
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
-    reach = middle[:, None] + frame @ (Numerics().support * np.stack([np.cos(angle), np.sin(angle)]))
-    axes.plot(*mesh.nodes.T, "o", color=DARK, label="material node: mass, position, v, σ, internal variables")
+    reach = middle[:, None] + SUPPORT * np.stack([np.cos(angle), np.sin(angle)])
+    axes.plot(*mesh.nodes.T, "o", color=DARK, label="node: mass, position, v, σ, internal variables")
     hollow = {"markerfacecolor": "white", "zorder": 3}
     axes.plot(
         *middles.T,
         "s",
         color=BRIGHT,
-        label="auxiliary node, in the middle of a cell: v, σ half a step on",
+        label="auxiliary node, in the middle of a cell",
         **hollow,
     )
-    axes.plot(*reach, "--", color=BRIGHT, label="its support of W, stretched and turned with the cell")
+    axes.plot(*reach, "--", color=BRIGHT, label="its support of W, in sums over neighbours")
     axes.quiver(
         *np.tile(middle[:, None], 2),
         *(0.42 * frame),

@@ -69,7 +69,7 @@ def schemes() -> str:
     """The schemes, and what a scene must know of each."""
     rows = []
     for scheme in SCHEMES.values():
-        free = "free" if scheme.unloads else "keeps its traction"
+        free = "free" if scheme.sums is None else "keeps its traction"
         kinds = ", ".join(kind.name for kind in scheme.kinds)
         rows.append((f"`{scheme.name}`", scheme.meaning, free, kinds))
     return table(("scheme", "meaning", "an edge without a condition", "cells"), rows)

@@ -1,4 +1,4 @@
-"""Von Neumann analysis of a step on an endless lattice: stability, dispersion, damping of every velocity scheme.
+"""Von Neumann analysis of a step on an endless lattice: stability, dispersion, damping of the published schemes.
 
 python tools/von_neumann.py                                     # three sheets in runs/von_neumann
 python tools/von_neumann.py --kernel wendland_c2 --smoothing-ratio 1.0 --poisson-ratio 0.45
@@ -8,13 +8,10 @@ In units of the lattice (Δx = ρ = c_p = 1, so that Δt is the Courant number C
 of φ = (v, σ) by a matrix. Every difference of a lattice is i times a real symbol, so with σ/i as the unknown the
 matrix is real. With S the symbol of a Shepard value, g that of a corrected gradient, R(g) that of −div f,
 
-    blanc-pastor, taylor:  φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same, or ← 2 S v_aux − v
-    compatible:            φ ← φ + C R(D) φ + (C²/2) R(g)² φ − θ χ φ + ¼ (1 − C²) (bulk viscosity) g g·v
+    φ_aux = S φ + (C/2) R(g) φ;  σ ← σ + C R(g) φ_aux;  v the same (taylor), or ← 2 S v_aux − v (blanc-pastor).
 
-with D the mean over a node's cells of their gradients, v's a share κ of the way to the corner, χ the checkerboard.
-Weights, shares and coefficients are the package's. The sensor of the front viscosity is not linear: here a share
-of it, from none to full, acts everywhere, in the pictures none. Phase speeds are the numerical over the exact one,
-the loss is of the amplitude in a period. tests/test_stability.py holds these matrices against the code.
+Weights are the package's. Phase speeds are the numerical over the exact one, the loss is of the amplitude in a
+period. tests/test_stability.py holds these matrices against the code.
 """
 
 import argparse
@@ -28,21 +25,18 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from warpsph import Numerics
 from warpsph.device.precision import PRECISIONS
 from warpsph.errors import WarpSPHError
 from warpsph.mesh.continuum import CONTINUA
-from warpsph.operators.checkerboard import STRESS_SHARE
-from warpsph.operators.front import STRENGTH
 from warpsph.operators.neighbour_sums import EDGE
-from warpsph.scene.numerics import Numerics
 from warpsph.scene.registry import KERNELS
 from warpsph.scene.scheme import SCHEMES
-from warpsph.step.compatible import VELOCITY_SHARE, corner_share
 
-ANALYSED = tuple(name for name, scheme in SCHEMES.items() if scheme.stepper is None)
+ANALYSED = tuple(name for name, scheme in SCHEMES.items() if scheme.sums is not None)
 COURANT = (0.3, 0.5, 0.8, 0.95)
 STABLE = 1.0 + 1e-9
-COLOURS = {"compatible": "#1f77b4", "taylor": "#d62728", "blanc-pastor": "#7f7f7f"}
+COLOURS = {"taylor": "#d62728", "blanc-pastor": "#7f7f7f"}
 LINES = (":", "-.", "--", "-")
 
 
@@ -87,21 +81,6 @@ class Mesh:
         phase = k @ x.T
         return np.cos(phase) @ w / w.sum(), np.sin(phase) @ (g[:, None] * x) / (g @ x[:, 0] ** 2)
 
-    def cells(self, k: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
-        """Symbols over i of the mean gradient of a node's cells, κ of the way to it, (K, d), less its middle part,
-        and of the checkerboard (K,)."""
-        sine, cosine = np.sin(0.5 * k), np.cos(0.5 * k)
-        gradient, checkerboard = np.zeros_like(k), np.zeros(len(k))
-        for size in range(2, self.dim + 1):
-            for axes in itertools.combinations(range(self.dim), size):
-                rest = np.prod(np.delete(cosine, axes, axis=1) ** 2, axis=1)
-                checkerboard += np.prod(sine[:, axes] ** 2, axis=1) * rest
-                for a in axes:
-                    others = [b for b in axes if b != a]
-                    mixed = np.prod(sine[:, others] ** 2, axis=1) * rest
-                    gradient[:, a] += 2.0 * share ** (size - 1) * sine[:, a] * cosine[:, a] * mixed
-        return gradient, checkerboard
-
     def rate(self, g: np.ndarray) -> np.ndarray:
         """−div f for gradients i g (K, d), as real matrices (K, n, n) of (v, σ/i)."""
         (lame, shear), d = self.moduli, self.dim
@@ -118,32 +97,21 @@ class Mesh:
                 matrix[:, row, j] += shear * g[:, i]
         return matrix
 
-    def step(self, k: np.ndarray, scheme: str, courant: float, viscosity: float = 0.0) -> np.ndarray:
+    def step(self, k: np.ndarray, scheme: str, courant: float) -> np.ndarray:
         """The matrices (K, n, n) of one step at wave vectors (K, d).
 
         Args:
             k: wave vectors [1/Δx].
             scheme: velocity scheme.
             courant: c_p Δt/Δx.
-            viscosity: share of the compatible scheme's front viscosity that acts, 0 to 1.
         """
         value, g = self.sweep(k)
         wave, d = self.rate(g), self.dim
         one = np.broadcast_to(np.eye(wave.shape[1]), wave.shape)
-        if scheme != "compatible":
-            auxiliary = value[:, None, None] * one + 0.5 * courant * wave
-            full = one + courant * wave @ auxiliary
-            if scheme == "blanc-pastor":
-                full[:, :d] = (2.0 * value[:, None, None] * auxiliary - one)[:, :d]
-            return full
-        corner, checkerboard = self.cells(k, corner_share(courant, d, KERNELS[self.kernel].support * self.ratio))
-        middle = g * np.prod(np.cos(0.5 * k), axis=1)[:, None]
-        rate = self.rate(middle)
-        rate[:, d:] = self.rate(middle + corner)[:, d:]
-        theta = np.where(np.arange(wave.shape[1]) < d, VELOCITY_SHARE, STRESS_SHARE) * checkerboard[:, None]
-        full = one + courant * rate + 0.5 * courant**2 * wave @ wave - theta[:, :, None] * one
-        front = viscosity * STRENGTH * max(1.0 - courant**2, 0.0) / 4.0
-        full[:, :d, :d] -= front * g[:, :, None] * g[:, None, :]
+        auxiliary = value[:, None, None] * one + 0.5 * courant * wave
+        full = one + courant * wave @ auxiliary
+        if scheme == "blanc-pastor":
+            full[:, :d] = (2.0 * value[:, None, None] * auxiliary - one)[:, :d]
         return full
 
 
@@ -153,18 +121,18 @@ def wave_vectors(dim: int, n: int) -> np.ndarray:
     return np.array(list(itertools.combinations_with_replacement(line, dim)))[1:]
 
 
-def spectral_radius(mesh: Mesh, scheme: str, courant: float, viscosity: float = 0.0, n: int = 17) -> float:
+def spectral_radius(mesh: Mesh, scheme: str, courant: float, n: int = 17) -> float:
     """The largest growth of any wave in one step."""
-    matrices = mesh.step(wave_vectors(mesh.dim, n), scheme, courant, viscosity)
+    matrices = mesh.step(wave_vectors(mesh.dim, n), scheme, courant)
     return float(np.abs(np.linalg.eigvals(matrices)).max())
 
 
-def largest_courant(mesh: Mesh, scheme: str, viscosity: float = 0.0, n: int = 17) -> float:
+def largest_courant(mesh: Mesh, scheme: str, n: int = 17) -> float:
     """The Courant number up to which no wave grows, to 10⁻³; 0 when waves grow at any."""
     low, high = 0.0, 2.0
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
-        stable = spectral_radius(mesh, scheme, middle, viscosity, n) <= STABLE
+        stable = spectral_radius(mesh, scheme, middle, n) <= STABLE
         low, high = (middle, high) if stable else (low, middle)
     return low
 
@@ -245,7 +213,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise ValueError(
                 f"--poisson-ratio = {options.poisson_ratio} is not allowed: it must be from 0 to below 0.5"
             )
-        numerics = Numerics(kernel=options.kernel, smoothing_ratio=options.smoothing_ratio)
+        numerics = Numerics(
+            velocity_scheme="taylor", kernel=options.kernel, smoothing_ratio=options.smoothing_ratio
+        )
         meshes = [Mesh(d, numerics.kernel, numerics.smoothing_ratio, options.poisson_ratio) for d in CONTINUA]
         for mesh in meshes:
             numerics.check_support(CONTINUA[mesh.dim])

@@ -17,6 +17,7 @@ from warpsph.simulation.device import all_cores
 from .machine import memory
 from .others import ADAPTERS
 from .scenes import Case
+from .timing import INTERVAL
 
 COMMAND = Path(__file__).resolve().parent.parent / "benchmark.py"
 HEADLINE = {"dimension": 2, "material": "viscoplastic", "nodes": 100_000}
@@ -132,7 +133,7 @@ def _too_much(case: Case, last: dict | None, plan: Plan) -> str | None:
     if free is not None and needed > MEMORY_SHARE * free:
         return f"it would take about {needed / 1e9:.0f} GB of memory, and {free / 1e9:.0f} GB are free"
     # The warm-up, one timed interval and the one for the phases.
-    steps = 3 * last["steps_per_list_build"]
+    steps = 3 * INTERVAL
     growth = max(1.0, last["growth"] or 1.0)
     expected = steps * last["seconds_per_step"] * (case.nodes / last["nodes"]) ** growth
     if expected > plan.limit:

@@ -1,8 +1,8 @@
-"""Counts what a step moves and computes, from the arrays a simulation really has.
+"""Counts what a step moves, from the arrays a simulation really has.
 
 Bytes: the least a step can move to and from memory, each array of a kernel once, elements whole (a kernel that
-changes one field of a packed struct moves all of it). Gathered neighbours count once a sweep: nodes are stored row
-by row, so that caches hold those of neighbouring targets. List builds are left out; they come once in a while.
+changes one field of a packed struct moves all of it). Neighbours that are gathered count once: nodes and cells are
+stored row by row, so that caches hold those of neighbouring targets.
 """
 
 import operator
@@ -12,135 +12,99 @@ import sys
 import warp as wp
 
 from warpsph import Simulation
-from warpsph.state.pairs import PairList
 
-# phase: (times a step, arrays read, arrays written), as attributes of the stepper, for the default numerics;
-# pair lists count their entries.
+NODES, MEANS = "body.nodes.", "_means."
+# kernel: (arrays read, arrays written), as attributes of the stepper, for the default numerics.
 TRAFFIC = {
-    "sources": (
-        2,
-        ("body.nodes.point", "body.nodes.velocity_gradient", "body.internals"),
-        ("body.nodes.point", "body.internals"),
+    "kick": (
+        (NODES + "point", NODES + "acceleration", NODES + "mass", NODES + "books", "conditions.row"),
+        (NODES + "half", NODES + "books"),
     ),
-    "to_auxiliary": (
-        1,
+    "strain": (("body.corners", NODES + "half"), ("_numbers",)),
+    "rate": (
+        ("body.node_cells.place", "_numbers", NODES + "mass"),
+        (NODES + "volume", NODES + "velocity_gradient"),
+    ),
+    "rate_mean": (
+        ("body.corners", "_numbers", NODES + "velocity_gradient", NODES + "flowed"),
+        (MEANS + "weight", MEANS + "rate"),
+    ),
+    "stress": (
         (
-            "lists.around_auxiliary",
-            "body.nodes.point",
-            "body.nodes.volume",
-            "body.nodes.velocity_gradient",
+            "body.node_cells.place",
+            MEANS + "weight",
+            MEANS + "rate",
+            NODES + "volume",
+            NODES + "velocity_gradient",
+            NODES + "half",
+            NODES + "point",
+            NODES + "reference",
+            NODES + "displacement",
+            NODES + "strained",
+            NODES + "books",
+            NODES + "flowed",
             "body.internals",
-            "body.auxiliary.point",
-            "body.auxiliary.smoothing_length",
-            "body.auxiliary.density",
-            "body.auxiliary.cell",
         ),
-        ("body.auxiliary.point", "fluxes._cells"),
-    ),
-    "to_nodes": (
-        1,
         (
-            "lists.around_nodes",
-            "body.auxiliary.point",
-            "body.auxiliary.volume",
-            "fluxes._cells",
+            NODES + "velocity_gradient",
+            NODES + "elastic_rate",
+            NODES + "point",
+            NODES + "displacement",
+            NODES + "strained",
+            NODES + "books",
+            NODES + "flowed",
+            "body.internals",
+        ),
+    ),
+    "stress_mean": (("body.corners", NODES + "point", MEANS + "weight"), (MEANS + "stress",)),
+    "sharpen": (
+        ("body.node_cells.place", MEANS + "weight", MEANS + "stress", NODES + "point", NODES + "volume"),
+        (NODES + "sharpened",),
+    ),
+    "force": (
+        (
+            "body.corners",
+            "body.cell_mass",
+            NODES + "point",
+            NODES + "sharpened",
+            NODES + "elastic_rate",
+            "_numbers",
+            "rough_loss",
+        ),
+        ("_forces", "rough_loss"),
+    ),
+    "push": (
+        (
             "body.node_cells.place",
-            "body.nodes.point",
-            "body.nodes.smoothing_length",
-            "body.nodes.density",
-            "body.nodes.velocity_gradient",
-            "conditions.table.held.row",
+            "_forces",
+            NODES + "mass",
+            NODES + "half",
+            NODES + "point",
+            NODES + "displacement",
+            NODES + "books",
+            "conditions.row",
         ),
-        ("body.nodes.point", "body.nodes.half_velocity", "body.nodes.velocity_gradient"),
-    ),
-    "conditions": (
-        1,
-        (
-            "body.nodes.point",
-            "body.nodes.displacement",
-            "body.nodes.velocity_gradient",
-            "conditions.table.held.row",
-        ),
-        ("body.nodes.point",),
-    ),
-    "motion": (
-        1,
-        (
-            # the nodes move
-            "body.nodes.point",
-            "body.nodes.displacement",
-            "body.nodes.half_velocity",
-            "body.nodes.reference",
-            # the cells are measured
-            "body.nodes.point",
-            "body.auxiliary.cell",
-            "body.auxiliary.point",
-            "lists.motion._initial_volume",
-            "lists.motion._mass",
-            "lists.motion._cell_h",
-            # the nodes get their share
-            "body.auxiliary.volume",
-            "body.auxiliary.smoothing_length",
-            "body.node_cells.place",
-            "body.nodes.weight",
-            "body.nodes.displacement",
-            "lists.motion._listed",
-            "lists.motion._listed_h",
-        ),
-        (
-            "body.nodes.point",
-            "body.nodes.displacement",
-            "body.auxiliary.point",
-            "body.auxiliary.volume",
-            "body.auxiliary.density",
-            "body.auxiliary.smoothing_length",
-            "body.nodes.volume",
-            "body.nodes.density",
-            "body.nodes.smoothing_length",
-        ),
+        (NODES + "acceleration", NODES + "point", NODES + "books"),
     ),
 }
 
 
-def pairs(pair_list: PairList) -> int:
-    """Entries of a pair list."""
-    return int(pair_list.start[-1:].numpy()[0])
-
-
-def bytes_per_node_step(simulation: Simulation, phases) -> dict[str, float]:
-    """Bytes moved a material node and step, by phase, for those phases that the scene has."""
+def bytes_per_node_step(simulation: Simulation) -> dict[str, float]:
+    """Bytes moved a node and step, by kernel."""
     stepper, n = simulation.stepper, len(simulation.mesh.nodes)
     return {
-        phase: times * sum(_size(stepper, name) for name in (*read, *written)) / n
-        for phase, (times, read, written) in TRAFFIC.items()
-        if phase in phases
+        kernel: sum(_size(stepper, name) for name in (*read, *written)) / n
+        for kernel, (read, written) in TRAFFIC.items()
     }
 
 
 def _size(stepper, name: str) -> int:
     found = operator.attrgetter(name)(stepper)
-    if name.startswith("lists.around"):
-        return 4 * (pairs(found) + found.start.shape[0])
     return 0 if found is None else _bytes(found)
 
 
 def _bytes(array: wp.array) -> int:
     return array.size * wp.types.type_size_in_bytes(array.dtype)
-
-
-def flops_per_node_step(simulation: Simulation) -> float:
-    """Floating-point operations of the two sweeps a material node and step; exp and division count as one.
-
-    With p unknowns in d dimensions a pair costs 5d + 4 + 3p + 2pd + 2d² (`warpsph.operators.neighbour_sums`), a
-    target's value and gradient 4p + 2pd + 2pd² beside the small inverse. Sources and motion are not counted.
-    """
-    stepper, continuum = simulation.stepper, simulation.mesh.continuum
-    d, p = continuum.dim, continuum.dim + continuum.stress_size
-    entries = pairs(stepper.lists.around_auxiliary) + pairs(stepper.lists.around_nodes)
-    n, m = len(simulation.mesh.nodes), len(simulation.mesh.cells)
-    a_pair = 5 * d + 4 + 3 * p + 2 * p * d + 2 * d * d
-    a_target = 4 * p + 2 * p * d + 2 * p * d * d
-    return (entries * a_pair + (n + m) * a_target) / n
 
 
 def memory_per_node(simulation: Simulation) -> float:

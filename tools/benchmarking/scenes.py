@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from warpsph import Box, Elastic, Free, Material, Numerics, PerzynaVonMises, Scene, edge
 
-# With half a skin of Δx/8 the pair lists are rebuilt about every 40 steps: often for a soil, whose nodes move some
-# 10⁻³ Δx a step, so that lists weigh rather more in the figures than in a run.
 TRAVEL = 1.0 / 320.0  # of the body in a step, in spacings
 SHEAR = 0.5  # difference in velocity between the body's ends over its mean velocity
 YIELD_SIZE = 5e3  # [Pa]

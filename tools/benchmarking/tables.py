@@ -44,7 +44,6 @@ def _speed(report: dict) -> str:
         "growth",
         "bytes/node-step",
         "of copy",
-        "Gflop/s",
         "bytes/node",
         "host peak",
     )
@@ -56,7 +55,6 @@ def _speed(report: dict) -> str:
             _number(row.get("growth"), ".2f"),
             f"{row['bytes_per_node_step']:.0f}",
             _percent(row.get("memory_bandwidth_fraction")),
-            f"{row['flops_per_second'] / 1e9:.2f}",
             f"{row['memory_per_node']:.0f}",
             f"{row['host_peak_per_node']:.0f}",
         )

@@ -34,15 +34,12 @@ def time_case(case: dict, seconds: float) -> dict:
     n = len(simulation.mesh.nodes)
     result = {"lattice_nodes": n, **timing.time_steps(simulation, seconds), "build_seconds": ready}
     result["node_steps_per_second"] = n / result["seconds_per_step"]
-    result["phases"] = phases = timing.time_phases(simulation)
-    moved = counting.bytes_per_node_step(simulation, phases)
-    flops = counting.flops_per_node_step(simulation)
+    result["phases"] = timing.time_phases(simulation)
+    moved = counting.bytes_per_node_step(simulation)
     result |= {
         "bytes_per_node_step": sum(moved.values()),
         "bytes_by_phase": moved,
         "bytes_per_second": sum(moved.values()) * result["node_steps_per_second"],
-        "flops_per_node_step": flops,
-        "flops_per_second": flops * result["node_steps_per_second"],
         "memory_per_node": counting.memory_per_node(simulation),
         "host_peak_per_node": (counting.peak_host_memory() - empty) / n,
     }

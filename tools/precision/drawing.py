@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from warpsph.scene.numerics import Numerics
 from warpsph.scene.scheme import SCHEMES
 
 from .campaign import Result
@@ -86,7 +87,7 @@ def _others(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
         if name != default and not result.setting.varies():
             continue
         if name not in lines:
-            colour = COLOURS["compatible"] if name == default else next(colours)
+            colour = COLOURS[Numerics.velocity_scheme] if name == default else next(colours)
             label = f"defaults: {name}" if name == default else name
             lines[name] = [], {"color": colour, "marker": "o", "label": label}
         lines[name][0].append(result)

@@ -1,4 +1,7 @@
-"""What is varied: velocity scheme and Courant number together, else one choice at a time from the defaults."""
+"""What is varied: velocity scheme and Courant number together, else one choice at a time.
+
+Choices that only sums over neighbours have are varied with the published scheme that keeps waves.
+"""
 
 from collections.abc import Iterator
 from dataclasses import asdict, astuple, dataclass, fields, replace
@@ -9,6 +12,7 @@ from warpsph.scene.registry import KERNELS
 from warpsph.scene.scheme import SCHEMES
 
 COURANT = (0.4, 0.8, 0.9, 1.0)
+SUMS = "taylor"
 EXACT_RATIO = 0.5  # h/Δx of the Gaussian with the nearest neighbours only: at C = 1 a bar's waves are exact
 
 
@@ -25,8 +29,8 @@ class Setting:
     spacing: float
     velocity_scheme: str = Numerics.velocity_scheme
     courant: float = Numerics.courant
-    kernel: str = Numerics.kernel
-    smoothing_ratio: float = KERNELS[Numerics.kernel].smoothing_ratio
+    kernel: str | None = None
+    smoothing_ratio: float | None = None
     source_scheme: str = Numerics.source_scheme
     precision: str = "float64"
 
@@ -35,8 +39,8 @@ class Setting:
         return {name: value for name, value in asdict(self).items() if name not in ("spacing", "precision")}
 
     def texts(self) -> tuple[str, ...]:
-        """The values as a CSV file holds them."""
-        return tuple(str(value) for value in astuple(self))
+        """The values as a CSV file holds them; nothing where a choice is left to the package."""
+        return tuple("" if value is None else str(value) for value in astuple(self))
 
     def varies(self) -> str:
         """What sets it apart from the defaults, besides scheme, Courant number and spacing."""
@@ -63,23 +67,22 @@ NAMES = tuple(field.name for field in fields(Setting))
 
 def parse(texts: dict[str, str]) -> Setting:
     """The setting of a row of a CSV file."""
-    kinds = {field.name: field.type for field in fields(Setting)}
-    return Setting(**{name: kinds[name](texts[name]) for name in NAMES})
+    kinds = {name: float if name in ("spacing", "courant", "smoothing_ratio") else str for name in NAMES}
+    return Setting(**{name: kinds[name](texts[name]) if texts[name] else None for name in NAMES})
 
 
 def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator[Setting]:
     """Every setting at one spacing; of source schemes only where sources matter."""
-    base = Setting(spacing)
+    base, sums = Setting(spacing), Setting(spacing, SUMS)
     for scheme, courant in product(SCHEMES, COURANT):
         yield replace(base, velocity_scheme=scheme, courant=courant)
-    for kernel in KERNELS:
-        if kernel != base.kernel:
-            yield replace(base, kernel=kernel, smoothing_ratio=KERNELS[kernel].smoothing_ratio)
+    for kernel in [*KERNELS][1:]:  # the first is the default
+        yield replace(sums, kernel=kernel)
     for ratio in ratios:
-        yield replace(base, smoothing_ratio=ratio)
+        yield replace(sums, smoothing_ratio=ratio)
     if EXACT_RATIO in ratios:
-        for scheme in SCHEMES:
-            yield replace(base, velocity_scheme=scheme, courant=1.0, smoothing_ratio=EXACT_RATIO)
+        for scheme in (name for name, record in SCHEMES.items() if record.sums is not None):
+            yield Setting(spacing, scheme, courant=1.0, smoothing_ratio=EXACT_RATIO)
     yield replace(base, precision="float32")
     if flows:
-        yield replace(base, source_scheme="rk4")
+        yield replace(sums, source_scheme="rk4")

@@ -34,8 +34,8 @@ def tables(results: Mapping[Case, Sequence[Result]]) -> str:
 def _legend() -> str:
     base = Setting(1.0)
     return (
-        f"In %, by spacing Δx [m]. Unless a row says otherwise: {base.kernel}, h = {base.smoothing_ratio:g} Δx, "
-        f"{base.source_scheme} sources, {base.precision}. A dash: not run, the reason is at the end."
+        f"In %, by spacing Δx [m]. Unless a row says otherwise: {base.source_scheme} sources, {base.precision}, "
+        "the package's smoothing in sums over neighbours. A dash: not run, the reason is at the end."
     )
 
 

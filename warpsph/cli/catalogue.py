@@ -23,13 +23,15 @@ from types import ModuleType, SimpleNamespace
 
 from ..errors import SceneError, WarpSPHError, one_of
 from ..scene.check import Check
+from ..scene.numerics import PUBLISHED
 from ..scene.parameter import Parameter, assign, namespace, numerical_parameters
 from ..scene.scene import Scene
-from ..validate import instance, listed
+from ..validate import choice, instance, listed
 from .neighbours import Neighbours
 from .settings import Settings
 
-DEFAULT_NUMERICS = "numerics=default"
+# What `numerics=NAME` stands for: numerical defaults instead of the scene's own.
+NUMERICS: Mapping[str, Mapping[str, object]] = {"default": {}, "published": PUBLISHED}
 PACKAGE = Path(__file__).resolve().parent.parent
 
 
@@ -89,10 +91,15 @@ class SceneFile:
     def build(self, settings: Sequence[str]) -> tuple[Scene, dict[str, object]]:
         """The scene with `name=value` settings applied, and the values of its parameters.
 
-        `numerics=default` stands for the package's numerical defaults instead of the scene's own.
+        `numerics=default` stands for the package's numerical defaults instead of the scene's own,
+        `numerics=published` for those that Blanc and Pastor computed their cases with.
         """
-        own = [text for text in settings if "".join(text.split()) != DEFAULT_NUMERICS]
-        values = assign(self.parameters if len(own) == len(settings) else self._parameters({}), own)
+        named = [text for text in settings if text.partition("=")[0].strip() == "numerics"]
+        parameters = self.parameters
+        for text in named:
+            name = text.partition("=")[2].strip()
+            parameters = self._parameters(NUMERICS[choice("numerics", name, NUMERICS)])
+        values = assign(parameters, [text for text in settings if text not in named])
         return self.build_from(values), values
 
     def build_from(self, values: Mapping[str, object]) -> Scene:

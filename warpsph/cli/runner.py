@@ -173,7 +173,7 @@ def _prepare(file, scene, parameters, settings, folder, restart, say) -> Course:
         number("until", settings.until, at_least=simulation.time if simulation.steps else shortest)
     where = simulation.device.alias + (f", {simulation.threads} threads" if simulation.threads > 1 else "")
     say(
-        f"{scene.name}: {len(simulation.mesh.nodes)} nodes, {len(simulation.mesh.cells)} auxiliary nodes, "
+        f"{scene.name}: {len(simulation.mesh.nodes)} nodes, {len(simulation.mesh.cells)} cells, "
         f"{simulation.precision.name} on {where}, time step {simulation.time_step_limit:.4g} s "
         f"(ready after {clock.perf_counter() - start:.1f} s)"
     )

@@ -15,25 +15,19 @@ ALIGNMENT = 16  # bytes
 
 
 @cache
-def packed(arrays: type, axis: int | None = None) -> wp.Function:
-    """(array, or struct of arrays) → nothing: for the compiler, that all of them are contiguous and aligned.
+def packed(arrays: type) -> wp.Function:
+    """(array, or struct of arrays) → nothing: for the compiler, that all of them are contiguous and aligned."""
 
-    Args:
-        arrays: type of the array or the struct.
-        axis: the axis of an array along which its elements stand side by side; the last unless given.
-    """
-
-    @wp.func_native("".join(_facts("a", arrays, axis)))
+    @wp.func_native("".join(_facts("a", arrays)))
     def are_packed(a: arrays): ...
 
     return are_packed
 
 
-def _facts(name: str, arrays: type, axis: int | None = None) -> Iterator[str]:
+def _facts(name: str, arrays: type) -> Iterator[str]:
     if isinstance(arrays, wp.array):
-        along = arrays.ndim - 1 if axis is None else axis
         yield f"__builtin_assume((uint64_t({name}.data) & {ALIGNMENT - 1}) == 0);"
-        yield f"__builtin_assume({name}.strides[{along}] == sizeof(*{name}.data));"
+        yield f"__builtin_assume({name}.strides[{arrays.ndim - 1}] == sizeof(*{name}.data));"
         return
     for field, variable in arrays.vars.items():
         yield from _facts(f"{name}.{field}", variable.type)

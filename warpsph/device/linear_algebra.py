@@ -21,14 +21,12 @@ class LinearAlgebra:
 
     Attributes:
         determinant: A → det A.
-        inverse: A → A⁻¹ of a regular matrix.
         symmetric_inverse: A → A⁻¹ of a symmetric positive semi-definite one, regularised where it has lost rank.
         rotation: (L, Δt) → exp(ω Δt), ω the skew part of L.
         largest: A → its largest eigenvalue, A symmetric and positive semi-definite, not zero.
     """
 
     determinant: wp.Function
-    inverse: wp.Function
     symmetric_inverse: wp.Function
     rotation: wp.Function
     largest: wp.Function
@@ -37,7 +35,7 @@ class LinearAlgebra:
 @cache
 def linear_algebra(dim: int, precision: Precision) -> LinearAlgebra:
     """The functions of one dimension in one precision."""
-    functions = (determinant_of, inverse_of, symmetric_inverse, rotation_of, largest_of)
+    functions = (determinant_of, symmetric_inverse, rotation_of, largest_of)
     return LinearAlgebra(*(function(dim, precision) for function in functions))
 
 
@@ -82,21 +80,6 @@ def determinant_of(dim: int, precision: Precision) -> wp.Function:
             return wp.determinant(a)
 
     return determinant
-
-
-@cache
-def inverse_of(dim: int, precision: Precision) -> wp.Function:
-    """Inverse of a regular d × d matrix, d = 1 included."""
-    matrix = precision.mat(dim, dim)
-
-    @wp.func
-    def inverse(a: matrix):
-        if wp.static(dim == 1):
-            return matrix(precision.real(1.0) / a[0, 0])
-        else:
-            return wp.inverse(a)
-
-    return inverse
 
 
 @cache

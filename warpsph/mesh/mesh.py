@@ -43,7 +43,7 @@ class Tag:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Nodes at the corners of cells; an auxiliary node will stand in the middle of each cell.
+    """Nodes at the corners of cells.
 
     Attributes:
         spacing: Δx, of the grid before any mapping [m].

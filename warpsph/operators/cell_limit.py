@@ -1,6 +1,7 @@
 """How much sooner than at the start a wave is across a cell of the scheme `cells`, looked at as the body strains.
 
-ω_T² = n c_p² λ_max(Σ_j ∇N_j ⊗ ∇N_j) bounds the frequencies of a cell; of a lattice's it is (2 c_p/Δx)².
+ω_T² = n c_p² λ_max(Σ_j ∇N_j ⊗ ∇N_j) bounds the frequencies of a cell; of a lattice's it is (2 c_p/Δx)². The
+stiffness and a cell's mass stay what they are: c_p² falls as a cell is pressed, and grows as it is stretched.
 """
 
 from functools import cache
@@ -39,11 +40,12 @@ class CellLimit:
 
     def refresh(self) -> None:
         """Measure it in the present configuration."""
-        self._body.launcher.launch(self._kernel, self._rate, [self._body.corners, self._body.nodes, self._rate])
+        body = self._body
+        body.launcher.launch(self._kernel, self._rate, [body.corners, body.cell_mass, body.nodes, self._rate])
         fastest = self._largest.of(self._rate)
         self._initial = self._initial or fastest
         self.shrinkage = self._initial / max(fastest, self._initial)
-        self._body.nodes.strained.zero_()
+        body.nodes.strained.zero_()
         self.outdated.zero_()
 
 
@@ -53,12 +55,18 @@ def _rate_kernel(space: Space, kind: CellKind):
     T = shape.weights
 
     @forward_kernel
-    def rate(first: int, corners: wp.array2d(dtype=wp.int32), nodes: CellNodes, result: wp.array(dtype=real)):
+    def rate(
+        first: int,
+        corners: wp.array2d(dtype=wp.int32),
+        cell_mass: wp.array(dtype=real),
+        nodes: CellNodes,
+        result: wp.array(dtype=real),
+    ):
         c = first + wp.tid()
         x = shape.Modes()
         for k in range(wp.static(kind.corners)):
             x += wp.outer(T[k], nodes.point[corners[c, k]].x)
         B, volume, _ = shape.measure(x)
-        result[c] = wp.sqrt(space.algebra.largest(shape.spread(B))) / wp.abs(volume)
+        result[c] = wp.sqrt(space.algebra.largest(shape.spread(B)) / (cell_mass[c] * wp.abs(volume)))
 
     return rate

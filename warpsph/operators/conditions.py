@@ -6,7 +6,6 @@ Edges given by selection are all in here; one that moves is added by `warpsph.op
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
@@ -26,10 +25,8 @@ class ConditionTypes:
     """Warp side of the conditions.
 
     Attributes:
-        Table: `held`, the velocities (`warpsph.operators.held`); what `BoundaryTable` has of stresses, a row each;
-            `turned`, the rotation R of an edge.
-        apply: (node, φ, HALF or END, Table) → φ after v ← P v + Σ a_k f_k and
-            σ ← R (Π(Rᵀ σ R) + Σ G_k Rᵀ t_k f_k) Rᵀ: faces turn with R, tractions t_k keep their directions.
+        Table: `held`, the velocities (`warpsph.operators.held`); what `BoundaryTable` has of stresses, a row each.
+        apply: (node, φ, HALF or END, Table) → φ after v ← P v + Σ a_k f_k and σ ← Π σ + Σ G_k t_k f_k.
     """
 
     Table: type
@@ -48,7 +45,6 @@ def condition_types(space: Space, loaded: bool) -> ConditionTypes:
         traction: wp.array2d(dtype=types.vector)
         traction_stress: wp.array2d(dtype=space.mat(size, space.dim))
         traction_function: wp.array2d(dtype=wp.int32)
-        turned: wp.array(dtype=types.tensor)
 
     @wp.func
     def apply(i: int, values: phi.phi, when: int, table: Table):
@@ -56,13 +52,12 @@ def condition_types(space: Space, loaded: bool) -> ConditionTypes:
         if row < 0:
             return values
         v = hold(i, phi.velocity(values), when, table.held)
-        R = table.turned[row]
-        sigma = table.stress_projector[row] * space.stress.transform(phi.stress(values), wp.transpose(R))
+        sigma = table.stress_projector[row] * phi.stress(values)
         if wp.static(loaded):
             for k in range(table.traction.shape[1]):
                 traction = table.held.drive[when, table.traction_function[row, k]] * table.traction[row, k]
-                sigma += table.traction_stress[row, k] * (wp.transpose(R) * traction)
-        return phi.with_stress(phi.with_velocity(values, v), space.stress.transform(sigma, R))
+                sigma += table.traction_stress[row, k] * traction
+        return phi.with_stress(phi.with_velocity(values, v), sigma)
 
     return ConditionTypes(Table, apply)
 
@@ -75,7 +70,6 @@ class Conditions:
         n: number of material nodes.
         clock: drives the conditions.
         moves: whether displacements are large, so that no body deforms faster than waves travel.
-        turns: whether edges that nobody moves turn with their nodes.
 
     Attributes:
         types: types of the table and its function.
@@ -92,26 +86,21 @@ class Conditions:
         launcher: Launcher,
         clock: Clock,
         moves: bool = True,
-        turns: bool = False,
     ):
         self._launcher, self._clock = launcher, clock
         self.types = condition_types(space, boundary.loaded)
         self.table = self.types.Table()
         self._fill(boundary, n, space)
-        self._kernel, self._turn = apply_kernel(space, self.types, moves), turn_kernel(space, self.types)
-        self.kernels = (self._kernel, self._turn)
-        free = ~boundary.moved & turns
-        self._any_turns = bool(free.any())
-        self._turns = wp.array(free.astype(np.int32), dtype=wp.int32, device=launcher.device)
+        self._kernel = apply_kernel(space, self.types, moves)
+        self.kernels = (self._kernel,)
 
     def _fill(self, boundary: BoundaryTable, n: int, space: Space) -> None:
-        rows, size, types = len(boundary.nodes), space.continuum.stress_size, space.types
+        size, types = space.continuum.stress_size, space.types
         for name, values, ndim, dtype in (
             ("stress_projector", boundary.stress_projector, 1, space.mat(size, size)),
             ("traction", boundary.traction, 2, types.vector),
             ("traction_stress", boundary.traction_stress, 2, space.mat(size, space.dim)),
             ("traction_function", boundary.traction_function, 2, wp.int32),
-            ("turned", np.tile(np.eye(space.dim), (rows, 1, 1)), 1, types.tensor),
         ):
             shape, device = values.shape[:ndim], self._launcher.device
             setattr(self.table, name, wp.array(values, dtype=dtype, shape=shape, device=device))
@@ -122,9 +111,7 @@ class Conditions:
         """Nothing: all conditions are on nodes chosen once and for all."""
 
     def turn(self, nodes, dt: wp.array) -> None:
-        """Turn the edges that nobody moves as the stresses turn in half a time step."""
-        if self._any_turns:
-            self._launcher.launch(self._turn, nodes.point, [nodes, self._turns, dt, self.table], gathers=False)
+        """Nothing: these edges keep their normals."""
 
     def apply(self, nodes) -> None:
         """Step 13: impose the conditions at the end of the step, in place; note what can not be true."""
@@ -157,26 +144,3 @@ def apply_kernel(space: Space, conditions: ConditionTypes, moves: bool):
                 faults[TOO_FAST] = 1
 
     return apply_conditions
-
-
-@cache
-def turn_kernel(space: Space, conditions: ConditionTypes):
-    """The kernel that turns some rows with the spin of their nodes."""
-
-    @forward_kernel
-    def turn(
-        first: int,
-        nodes: space.types.MaterialNodes,
-        turns: wp.array(dtype=wp.int32),
-        dt: wp.array(dtype=space.real),
-        table: conditions.Table,
-    ):
-        i = first + wp.tid()
-        row = table.held.row[i]
-        if row < 0:
-            return
-        if turns[row] == 1:
-            R = space.algebra.rotation(nodes.velocity_gradient[i], space.real(0.5) * dt[0])
-            table.turned[row] = R * table.turned[row]
-
-    return turn

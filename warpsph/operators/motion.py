@@ -14,7 +14,7 @@ import warp as wp
 from ..device.compiling import forward_kernel
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.body import Body
+from ..state.nodes import SumsBody
 
 
 class SmallMotion:
@@ -24,7 +24,7 @@ class SmallMotion:
         body: the body.
     """
 
-    def __init__(self, body: Body):
+    def __init__(self, body: SumsBody):
         self._body, self._displace = body, _displace_kernel(body.space)
         self.kernels = (self._displace,)
 
@@ -36,10 +36,6 @@ class SmallMotion:
     def mark(self) -> None:
         """Nothing."""
 
-    def shrinkage(self) -> float:
-        """1: the spacing stays."""
-        return 1.0
-
 
 class Motion:
     """Moves the nodes with v^{n+1/2}, and tells when the pair lists have used up their skin.
@@ -48,12 +44,11 @@ class Motion:
         body: the body, whose auxiliary nodes have been centred.
         skin: skin of the pair lists [m].
         outdated: one integer, set once some node has used up its half of the skin since `mark`.
-        faults: where kernels note what can not be true; cells that fold where they are measured.
     """
 
-    def __init__(self, body: Body, *, skin: float, outdated: wp.array, faults: wp.array):
+    def __init__(self, body: SumsBody, *, skin: float, outdated: wp.array):
         space, nodes = body.space, body.nodes
-        self._body, self._skin, self._outdated, self._faults = body, skin, outdated, faults
+        self._body, self._skin, self._outdated = body, skin, outdated
         self._support = body.scene.numerics.smoothing.support
         self._reference_density = body.scene.material.density
         self._initial_smoothing_length = wp.clone(nodes.smoothing_length)
@@ -66,10 +61,6 @@ class Motion:
         """Remember where the nodes are now: the pair lists were just built for this."""
         wp.copy(self._listed, self._body.nodes.displacement)
         wp.copy(self._listed_h, self._body.nodes.smoothing_length)
-
-    def shrinkage(self) -> float:
-        """1: the published schemes keep their step, since their viscosity depends on it."""
-        return 1.0
 
     def move(self, dt: wp.array) -> None:
         """x ← x + Δt v^{n+1/2}, ρ ← ρ/(change of volume), h ← h₀ (ρ₀/ρ)^{1/d}, auxiliary nodes re-centred."""

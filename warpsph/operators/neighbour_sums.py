@@ -26,9 +26,7 @@ class NeighbourSums:
     """The functions of one pass over the neighbours.
 
     Attributes:
-        collect: (target index, its x and metric M, base value, pair list, source points, their volumes) → Sums.
-            ξ² = |M r|²: M = 1/h for a round kernel; the corrected gradient is the same for any M, since A⁻¹ takes
-            MᵀM out of ∇W again.
+        collect: (target index, its x and h, base value, pair list, source points, their volumes) → Sums.
         value: Sums → Shepard value; the base value where no neighbour is left.
         gradient: (Sums, φ_I) → ∇φ_I, zero along directions without neighbours.
     """
@@ -75,7 +73,7 @@ def neighbour_sums(space: Space, kernel: SmoothingKernel, batch: int = CPU_BATCH
     def collect(
         target: int,
         x: types.vector,
-        metric: types.tensor,
+        h: real,
         base: types.phi,
         pairs: PairList,
         sources: wp.array(dtype=types.Point),
@@ -89,7 +87,7 @@ def neighbour_sums(space: Space, kernel: SmoothingKernel, batch: int = CPU_BATCH
         first, end = int(pairs.start[target]), pairs.start[target + 1]
         while first < end:
             count = wp.min(end - first, wp.static(batch))
-            w, g = weigh(x, metric, first, count, pairs, sources)
+            w, g = weigh(x, real(1.0) / h, first, count, pairs, sources)
             n = wp.int32(0)
             while n < count:
                 j = neighbour(first + n, pairs)
@@ -143,7 +141,7 @@ def _weigh(space: Space, kernel: SmoothingKernel, batch: int) -> tuple[wp.Functi
     @wp.func
     def weigh(
         x: space.types.vector,
-        metric: space.types.tensor,
+        per_h: real,
         first: int,
         count: int,
         pairs: PairList,
@@ -155,7 +153,7 @@ def _weigh(space: Space, kernel: SmoothingKernel, batch: int) -> tuple[wp.Functi
         xi2, w, g = numbers(), numbers(), numbers()
         n = wp.int32(0)
         while n < count:
-            xi = metric * (sources[neighbour(first + n, pairs)].x - x)
+            xi = per_h * (sources[neighbour(first + n, pairs)].x - x)
             xi2[n] = wp.dot(xi, xi)
             n += 1
         n = wp.int32(0)
@@ -167,32 +165,3 @@ def _weigh(space: Space, kernel: SmoothingKernel, batch: int) -> tuple[wp.Functi
         return w, g
 
     return weigh, neighbour
-
-
-@cache
-def round_metric(space: Space) -> wp.Function:
-    """h → M = 1/h, of a round kernel."""
-
-    @wp.func
-    def metric_of(h: space.real):
-        metric = space.types.tensor()
-        for k in range(wp.static(space.dim)):
-            metric[k, k] = space.real(1.0) / h
-        return metric
-
-    return metric_of
-
-
-@cache
-def cell_metric(space: Space, ratio: float) -> wp.Function:
-    """(∇ξ of the cells, h) → M of a kernel with h/Δx = ratio that is stretched and turned with the cells (as in
-    adaptive SPH, Owen et al. 1998); 1/h where they have folded."""
-    round_one = round_metric(space)
-
-    @wp.func
-    def metric_of(frame: space.types.tensor, h: space.real):
-        if wp.ddot(frame, frame) <= space.real(0.0):
-            return round_one(h)
-        return space.real(wp.static(1.0 / ratio)) * frame
-
-    return metric_of

@@ -19,7 +19,6 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
-from ..errors import SceneError
 from ..materials.law import Law
 from ..physics.space import Space
 from ..scene.scene import Scene
@@ -78,15 +77,7 @@ def spins(scene: Scene) -> bool:
 
 
 def sources(scene: Scene, law: Law, parameters, space: Space, launcher: Launcher) -> Sources | NoSources:
-    """The sources of a scene by the scheme it names; an object that does nothing when it has none.
-
-    Raises:
-        SceneError: the law can not be integrated by that scheme.
-    """
-    scheme = scene.numerics.source_scheme
-    if scheme not in law.source_schemes:
-        takes = ", ".join(law.source_schemes)
-        raise SceneError("source_scheme", scheme, f"the law of {type(scene.material).__name__} takes {takes} only")
+    """The sources of a scene by the scheme it names; an object that does nothing when it has none."""
     if not law.flows and not spins(scene) and scene.body_force is None and scene.damping == 0.0:
         return NoSources()
     return Sources(scene, law, parameters, space, launcher)

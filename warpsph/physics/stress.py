@@ -31,7 +31,6 @@ class StressFunctions:
         relaxation_modulus: (G, E) → what it takes off q, ∂q/∂σ : Dₑ : ∂q/∂σ: 3 G; E in a bar.
         spherical: p → p 1 as stored, σ33 of plane strain included; p in a bar.
         transform: (σ, P) → P σ Pᵀ of the components in space; σ33 of plane strain is kept.
-        norm: σ → √(σ : σ).
         traction: (σ, n) → σ n.
         complementary: (σ, σ', λ, G, E) → σ : Dₑ⁻¹ : σ', twice the elastic energy a volume has where σ = σ'.
     """
@@ -46,7 +45,6 @@ class StressFunctions:
     relaxation_modulus: wp.Function
     spherical: wp.Function
     transform: wp.Function
-    norm: wp.Function
     traction: wp.Function
     complementary: wp.Function
 
@@ -101,10 +99,6 @@ def _bar(types: NodeTypes, real: type) -> StressFunctions:
         return P[0, 0] * sigma * P[0, 0]
 
     @wp.func
-    def norm(sigma: types.stress):
-        return wp.abs(sigma[0])
-
-    @wp.func
     def traction(sigma: types.stress, normal: types.vector):
         return types.vector(sigma[0] * normal[0])
 
@@ -122,7 +116,6 @@ def _bar(types: NodeTypes, real: type) -> StressFunctions:
         von_mises=von_mises,
         spherical=spherical,
         transform=transform,
-        norm=norm,
         deviator=deviator,
         relaxation=relaxation,
         relaxation_modulus=relaxation_modulus,
@@ -203,10 +196,6 @@ def _plane_strain(types: NodeTypes, real: type) -> StressFunctions:
         return types.stress(s[0, 0], s[1, 1], s[0, 1], sigma[3])
 
     @wp.func
-    def norm(sigma: types.stress):
-        return wp.sqrt(wp.dot(sigma, sigma) + sigma[2] * sigma[2])
-
-    @wp.func
     def traction(sigma: types.stress, n: types.vector):
         return types.vector(sigma[0] * n[0] + sigma[2] * n[1], sigma[2] * n[0] + sigma[1] * n[1])
 
@@ -224,7 +213,6 @@ def _plane_strain(types: NodeTypes, real: type) -> StressFunctions:
         von_mises=von_mises,
         spherical=spherical,
         transform=transform,
-        norm=norm,
         **_flow(types, real, mean, spherical),
     )
 
@@ -280,11 +268,6 @@ def _solid(types: NodeTypes, real: type) -> StressFunctions:
         return stored(P * tensor(sigma) * wp.transpose(P))
 
     @wp.func
-    def norm(sigma: types.stress):
-        shear2 = sigma[3] * sigma[3] + sigma[4] * sigma[4] + sigma[5] * sigma[5]
-        return wp.sqrt(wp.dot(sigma, sigma) + shear2)
-
-    @wp.func
     def traction(sigma: types.stress, n: types.vector):
         return tensor(sigma) * n
 
@@ -302,7 +285,6 @@ def _solid(types: NodeTypes, real: type) -> StressFunctions:
         von_mises=von_mises,
         spherical=spherical,
         transform=transform,
-        norm=norm,
         **_flow(types, real, mean, spherical),
     )
 

@@ -76,6 +76,11 @@ class Run(SceneRun):
         return Result(self, folder, summary, history, Frames(folder))
 
 
+def published(name: str, scene: str, settings: tuple[str, ...] = (), frames: tuple[float, ...] = ()) -> Run:
+    """A run with the numerics that the paper's cases were computed with."""
+    return Run(name, scene, ("numerics=published", *settings), frames)
+
+
 @dataclass(frozen=True)
 class Result:
     """A run that is done.

@@ -23,9 +23,9 @@ LARGEST_SCAN = 2.0
 class FreeSurface:
     """Makes the body's edge traction-free wherever no velocity is prescribed, as it moves and deforms.
 
+    For the published schemes, whose edges keep what traction they have; those of `cells` are free by themselves.
     Surface nodes and their normals are found anew in the current configuration (see
-    `warpsph.operators.surface.scan`), unlike those of `Free`, whose initial normals turn with their nodes'
-    spin (with a published velocity scheme they do not).
+    `warpsph.operators.surface.scan`); those of `Free` stay what they initially are.
 
     Args:
         scan_ratio: length of the scan over the local spacing h_s/Δx [-].

@@ -14,6 +14,8 @@ from .smoothing import SmoothingKernel
 SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
+MOST_SHARPENING = 0.7  # more turns dispersion round, and shortens the stable step
+SHARPENING = 2.0 / 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,38 +23,61 @@ class Numerics:
     """Choices of the discretisation.
 
     Args:
-        kernel: smoothing kernel: gaussian (the paper's), cubic_spline, wendland_c2 or one that was registered.
-        smoothing_ratio: smoothing length over spacing h/Δx [-]; the kernel's own default unless given. With
-            `compatible` keep the support below 2.12 Δx, and it must be at most 2.55 Δx: see
-            docs/velocity_steps.md, "What still fails".
+        velocity_scheme: the name of a scheme: `cells` (energy-conjugate, any kind of cell; docs/method.md,
+            section 8), `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
         courant: c_p Δt/Δx [-], c_p the fastest wave's speed.
-        velocity_scheme: the name of a scheme: `compatible` (no numerical viscosity; docs/velocity_steps.md),
-            `cells` (energy-conjugate, any kind of cell; docs/method.md, section 8),
-            `blanc-pastor` (the published 2 v^{n+1/2} − v) or `taylor` (the paper's complete scheme).
-        source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff).
+        source_scheme: `analytic` (no limit to the step) or `rk4` (as published, sub-stepped where stiff; of sums
+            over neighbours only).
+        kernel: smoothing kernel of sums over neighbours: gaussian (the paper's, and what they take unless another
+            is given), cubic_spline, wendland_c2 or one that was registered. None with `cells`.
+        smoothing_ratio: smoothing length over spacing h/Δx [-] of sums over neighbours; the kernel's own default
+            unless given. None with `cells`.
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
+        sharpening: c of `cells` [-], 0 to 0.7, 2/3 unless given: how far what a mean over a cell's corners takes
+            off short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes
+            longer. None with sums over neighbours.
     """
 
-    kernel: str = "gaussian"
-    smoothing_ratio: float | None = None
+    velocity_scheme: str = "cells"
     courant: float = 0.8
-    velocity_scheme: str = "compatible"
     source_scheme: str = "analytic"
+    kernel: str | None = None
+    smoothing_ratio: float | None = None
     time_step: float | None = None
+    sharpening: float | None = None
 
     def __post_init__(self):
-        choice("kernel", self.kernel, KERNELS)
-        scheme_of(self.velocity_scheme)
+        scheme = scheme_of(self.velocity_scheme)
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
-        ratio = self.smoothing.smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
-        object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
+        if scheme.sums is None:
+            self._refuse_what_sums_take()
+            sharpening = SHARPENING if self.sharpening is None else self.sharpening
+            sharpening = number("sharpening", sharpening, at_least=0.0, at_most=MOST_SHARPENING)
+            object.__setattr__(self, "sharpening", sharpening)
+        else:
+            if self.sharpening is not None:
+                allowed = f"velocity_scheme {self.velocity_scheme} knows none; leave it out"
+                raise SceneError("sharpening", self.sharpening, allowed)
+            kernel = "gaussian" if self.kernel is None else self.kernel
+            object.__setattr__(self, "kernel", choice("kernel", kernel, KERNELS))
+            ratio = self.smoothing.smoothing_ratio if self.smoothing_ratio is None else self.smoothing_ratio
+            object.__setattr__(self, "smoothing_ratio", number("smoothing_ratio", ratio, above=0.0))
         object.__setattr__(self, "courant", number("courant", self.courant, above=0.0))
         if self.time_step is not None:
             object.__setattr__(self, "time_step", number("time_step", self.time_step, above=0.0))
 
+    def _refuse_what_sums_take(self) -> None:
+        for name in ("kernel", "smoothing_ratio"):
+            if getattr(self, name) is not None:
+                allowed = f"velocity_scheme {self.velocity_scheme} takes no sums over neighbours; leave it out"
+                raise SceneError(name, getattr(self, name), allowed)
+        if self.source_scheme != "analytic":
+            allowed = f"velocity_scheme {self.velocity_scheme} takes analytic only"
+            raise SceneError("source_scheme", self.source_scheme, allowed)
+
     @property
     def smoothing(self) -> SmoothingKernel:
-        """The smoothing kernel that `kernel` names."""
+        """The smoothing kernel that `kernel` names, of a scheme with sums over neighbours."""
         return KERNELS[self.kernel]
 
     @property
@@ -62,21 +87,21 @@ class Numerics:
 
     @property
     def support(self) -> float:
-        """Radius of the support over spacing [-]."""
+        """Radius of the support over spacing [-], of a scheme with sums over neighbours."""
         return self.smoothing.support * self.smoothing_ratio
 
     def check_support(self, continuum: Continuum, stretch: float = 1.0) -> None:
-        """Refuse a support that is too small (or absurdly large) for the lattice.
+        """Refuse a support that is too small (or absurdly large) for the lattice; cells have none.
 
         Args:
             continuum: the continuum, for its number of dimensions.
             stretch: longest cell edge over spacing, 1 on a regular lattice.
         """
-        if self.scheme.stepper is not None:  # it takes no sums over neighbours
+        if self.scheme.sums is None:
             return
         support = self.smoothing.support
         least = continuum.smallest_support * stretch / support
-        most = self.scheme.largest_support(continuum.dim) / support
+        most = self.scheme.sums.largest_support / support
         if not least < self.smoothing_ratio <= most:
             reach = continuum.smallest_support * stretch
             raise SceneError(

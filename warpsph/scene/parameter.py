@@ -69,13 +69,15 @@ class Parameter:
     def parse(self, text: object) -> float | int | bool | str | None:
         """The value a command line gives."""
         value, automatic = str(text).strip(), self.automatic or self.default is None
-        if self.choices and value not in self.choices:
-            raise SceneError(self.name, value, one_of(self.choices, value))
+        if automatic and value.lower() in ("auto", "none"):
+            return None
+        if self.choices:
+            if value not in self.choices:
+                raise SceneError(self.name, value, one_of(self.choices, value))
+            return value
         try:
             if isinstance(self.default, bool):
                 return {"true": True, "false": False, "1": True, "0": False}[value.lower()]
-            if automatic and value.lower() in ("auto", "none"):
-                return None
             return float(value) if self.default is None else type(self.default)(value)
         except (KeyError, ValueError):
             kind = {bool: "true or false", int: "a whole number"}.get(type(self.default), "a number")
@@ -85,20 +87,36 @@ class Parameter:
 def numerical_parameters(defaults: Mapping[str, object]) -> tuple[Parameter, ...]:
     """The parameters every scene takes, with a scene's own defaults where it has any."""
     standard = {
-        "smoothing_ratio": (None, "-", "smoothing length over spacing h/Δx; auto is the kernel's own default", ()),
-        "courant": (Numerics.courant, "-", "c_p Δt/Δx, c_p the fastest wave's speed", ()),
-        "kernel": (Numerics.kernel, "-", f"smoothing function: {', '.join(KERNELS)}", tuple(KERNELS)),
         "velocity_scheme": (
             Numerics.velocity_scheme,
             "-",
             f"velocity step: {', '.join(SCHEMES)}",
             tuple(SCHEMES),
         ),
+        "courant": (Numerics.courant, "-", "c_p Δt/Δx, c_p the fastest wave's speed", ()),
         "source_scheme": (
             Numerics.source_scheme,
             "-",
-            f"sources: {', '.join(SOURCE_SCHEMES)}",
+            f"sources: {', '.join(SOURCE_SCHEMES)}; cells takes analytic only",
             SOURCE_SCHEMES,
+        ),
+        "kernel": (
+            None,
+            "-",
+            f"smoothing function of sums over neighbours: {', '.join(KERNELS)}; auto is gaussian; none with cells",
+            tuple(KERNELS),
+        ),
+        "smoothing_ratio": (
+            None,
+            "-",
+            "smoothing length over spacing h/Δx of these sums; auto is the kernel's own default",
+            (),
+        ),
+        "sharpening": (
+            None,
+            "-",
+            "of cells, 0 to 0.7, auto is 2/3: how far short waves get back what means take",
+            (),
         ),
         "time_step": (None, "s", "Δt; auto follows from courant and the stiffness of the sources", ()),
     }

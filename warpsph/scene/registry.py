@@ -49,7 +49,7 @@ def _row(record: object) -> tuple[dict, str, str]:
     if isinstance(record, SmoothingKernel):
         return KERNELS, record.name, _place(record.weights)
     if isinstance(record, Scheme):
-        return SCHEMES, record.name, _place(record.stepper or record.fluxes)
+        return SCHEMES, record.name, _place(record.stepper if record.sums is None else record.sums.fluxes)
     raise SceneError("register", record, "it must be a subclass of Material, a SmoothingKernel or a Scheme")
 
 
@@ -60,5 +60,6 @@ def _place(made_by: object) -> str:
 def needs_code(scene: Scene) -> bool:
     """Whether a scene names what code outside of this package has registered: a document alone can not know it."""
     numerics = scene.numerics
-    records = (type(scene.material), KERNELS[numerics.kernel], SCHEMES[numerics.velocity_scheme])
+    kernels = () if numerics.scheme.sums is None else (numerics.smoothing,)
+    records = (type(scene.material), numerics.scheme, *kernels)
     return not all(_row(record)[-1].startswith(f"{PACKAGE}.") for record in records)

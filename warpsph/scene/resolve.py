@@ -6,9 +6,9 @@ At a constrained node, applying the conditions at time t means
 
 with P the projector onto the directions whose velocity is free, Π a projector onto the stresses whose prescribed
 tractions vanish, and t_k the prescribed tractions, vectors in space, which the stress G_k t_k has. Π is orthogonal
-in the Frobenius norm (tractions are put in place, all else kept, as published) or in that of the elastic energy
-(they go and come by elastic strain): with N the tractions' rows, N σ their values, and D that norm's metric, the
-identity or Dₑ, G N = D Nᵀ (N D Nᵀ)⁻¹ N = 1 − Π. Where conditions meet (METHOD section 5):
+in the Frobenius norm (tractions are put in place, all else kept, as published): with N the tractions' rows, N σ
+their values, and D that norm's metric on the stored components, G N = D Nᵀ (N D Nᵀ)⁻¹ N = 1 − Π. Where conditions
+meet (METHOD section 5):
 
 - a velocity condition beats a traction condition: a free edge frees only the directions that nobody moves;
 - a wall without friction keeps its zero shear at its ends as well, as a plane of symmetry does;
@@ -73,20 +73,11 @@ class BoundaryTable:
         return self.traction.shape[1] > 0
 
 
-def resolve(mesh: Mesh, conditions: Sequence[Condition], stiffness: np.ndarray | None = None) -> BoundaryTable:
-    """Resolve the conditions on a mesh; see the module's text for the rules.
-
-    Args:
-        mesh: the mesh.
-        conditions: the conditions.
-        stiffness: Dₑ on the stored components (s, s), up to a factor: tractions then go and come by elastic
-            strain. They are put in place, all other components kept, unless it is given.
-    """
+def resolve(mesh: Mesh, conditions: Sequence[Condition]) -> BoundaryTable:
+    """Resolve the conditions on a mesh; see the module's text for the rules."""
     dim, size, groups = mesh.dim, mesh.continuum.stress_size, _groups(mesh, conditions)
     nodes = np.array(sorted(node for members in groups.values() for node in members), dtype=np.int64)
     row_of = {node: row for row, node in enumerate(nodes.tolist())}
-    if stiffness is None:
-        stiffness = np.diag([1.0 if i == j else 0.5 for i, j in mesh.continuum.pairs])
     projectors = np.zeros((len(nodes), dim, dim))
     stress = np.zeros((len(nodes), size, size))
     moved = np.zeros(len(nodes), dtype=bool)
@@ -116,7 +107,7 @@ def resolve(mesh: Mesh, conditions: Sequence[Condition], stiffness: np.ndarray |
             for coefficient, function in parts:
                 velocities.add(where, coefficient[:, None] * column, function)
         faces = _prescribed_tractions(signature, conditions, projector, points)
-        stress[where], lifts_here = _stress_map(faces, mesh.continuum, stiffness)
+        stress[where], lifts_here = _stress_map(faces, mesh.continuum)
         for (condition, normal, _), lift in zip(faces, lifts_here, strict=True):
             for vectors, function in condition.tractions(points, normal):
                 tractions.add(where, vectors, function)
@@ -308,17 +299,15 @@ def _prescribed_tractions(signature, conditions, projector, points) -> list[Trac
     return found
 
 
-def _stress_map(
-    faces: Sequence[Tractions], continuum: Continuum, stiffness: np.ndarray
-) -> tuple[np.ndarray, list[np.ndarray]]:
+def _stress_map(faces: Sequence[Tractions], continuum: Continuum) -> tuple[np.ndarray, list[np.ndarray]]:
     """Π at a node, and for each of the prescribed tractions G (s, d), from its vector to a stress that has it."""
     if not faces:
         return np.eye(continuum.stress_size), []
     traction = np.array(
         [_traction_row(u, normal, continuum) for _, normal, directions in faces for u in directions]
     )
-    compliance = np.linalg.pinv(traction @ stiffness @ traction.T, rcond=TOLERANCE)
-    solutions = stiffness @ traction.T @ compliance
+    metric = np.diag([1.0 if i == j else 0.5 for i, j in continuum.pairs])
+    solutions = metric @ traction.T @ np.linalg.pinv(traction @ metric @ traction.T, rcond=TOLERANCE)
     ends = np.cumsum([len(along) for _, _, along in faces])
     parts = zip(np.split(solutions, ends[:-1], axis=1), faces, strict=True)
     lifts = [_clean(columns @ along) for columns, (_, _, along) in parts]

@@ -27,7 +27,6 @@ from .material import Material
 from .numerics import Numerics
 from .output import Output
 from .resolve import BoundaryTable, resolve
-from .selection import Bare
 from .shape import Shape
 from .thickness import check_thickness
 
@@ -66,7 +65,8 @@ class Scene:
         duration: simulated time [s].
         conditions: boundary conditions; an edge without one is free of traction (with a published velocity
             scheme it keeps whatever traction it has).
-        free_surface: frees the edge that no condition moves of its tractions, as it moves and deforms; or None.
+        free_surface: for a published velocity scheme, frees the edge that no condition moves of its tractions, as
+            it moves and deforms; or None.
         body_force: uniform body force, or None.
         damping: mass-proportional damping c [1/s]: dv/dt = … − c v.
         velocity: initial velocity [m/s], a function of position f(x, y, …) → one part an axis; rest unless given.
@@ -128,16 +128,24 @@ class Scene:
             vector("BodyForce.acceleration", self.body_force.acceleration, dim)
         if self.free_surface is not None:
             self._check_free_surface()
-        scheme, stretch = self.numerics.scheme, self.mesh.largest_edge() / self.mesh.spacing
-        scheme.check_cells(self.mesh)
-        self.numerics.check_support(self.mesh.continuum, 1.0 if scheme.follows_cells else stretch)
+        self.numerics.scheme.check_cells(self.mesh)
+        self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
         self.output.check(self.mesh, self.duration)
-        surface = self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else []
-        check_thickness(self.mesh, self.boundary, surface)
+        check_thickness(self.mesh, self.boundary, self._freed_nodes())
         _ = self.initial_velocity, self.initial_stress, self.initial_internals
+
+    def _freed_nodes(self) -> np.ndarray:
+        """Indices of the nodes whose edges are free, conditions aside."""
+        if self.numerics.scheme.sums is None:
+            return np.unique(self.mesh.faces)
+        return self.free_surface.candidates(self.mesh, self.conditions) if self.free_surface else np.arange(0)
 
     def _check_free_surface(self) -> None:
         surface = instance("free_surface", self.free_surface, FreeSurface, "FreeSurface(…) or None")
+        if self.numerics.scheme.sums is None:
+            scheme = self.numerics.velocity_scheme
+            allowed = f"with velocity_scheme {scheme} an edge that nobody moves or loads is free; leave it out"
+            raise SceneError("free_surface", surface, allowed)
         surface.check(self.mesh.dim)
         for index, condition in enumerate(self.conditions):
             if isinstance(condition, Free):
@@ -156,12 +164,7 @@ class Scene:
     @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node."""
-        if not self.numerics.scheme.unloads:
-            return resolve(self.mesh, self.conditions)
-        conditions, bare = self.conditions, Bare(tuple(condition.on for condition in self.conditions))
-        if self.free_surface is None and bare.faces(self.mesh).any():
-            conditions = (*conditions, Free(bare))
-        return resolve(self.mesh, conditions, self.material.stiffness(self.mesh.continuum))
+        return resolve(self.mesh, self.conditions)
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:

@@ -33,11 +33,11 @@ class Field:
 
 
 def _sums_over_neighbours(scene) -> bool:
-    return scene.numerics.scheme.stepper is None
+    return scene.numerics.scheme.sums is not None
 
 
 def _has_free_surface(scene) -> bool:
-    return scene.free_surface is not None and _sums_over_neighbours(scene)
+    return scene.free_surface is not None
 
 
 def _phi(simulation) -> np.ndarray:
@@ -45,7 +45,7 @@ def _phi(simulation) -> np.ndarray:
 
 
 def _stress(simulation) -> np.ndarray:
-    return _phi(simulation)[:, simulation.mesh.dim :].copy()
+    return simulation.stepper.body.stress()
 
 
 def component_names(name: str, continuum: Continuum) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from ..physics.space import Space
 from ..scene.place import node_at
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
-from ..step.sums import SumsStepper
+from ..step import scheme  # noqa: F401 — makes the schemes known
 from ..validate import instance, number
 from .breakdown import FLATTENED, LEAST_STEP_SHARE, breakdown
 from .device import choose_device, choose_threads
@@ -61,7 +61,7 @@ class Simulation:
         shortest_step, longest_step: smallest and largest Δt used so far [s].
         wall_time: seconds spent in steps, without the start.
         threads: number of CPU threads.
-        nodes, auxiliary, internals: the arrays on the device.
+        nodes, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
         stepper: makes the steps; for developers, its parts may change from version to version.
 
@@ -84,10 +84,9 @@ class Simulation:
         self._time_step = TimeStep(scene, lambda: self.stepper.shrinkage)
         launcher = Launcher(self.device, choose_threads(threads, len(self.mesh.nodes)))
         self.threads = launcher.threads
-        stepper = scene.numerics.scheme.stepper or SumsStepper
-        self.stepper = stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
+        self.stepper = scene.numerics.scheme.stepper(scene, Space(self.mesh.continuum, self.precision), launcher)
         body = self.stepper.body
-        self.nodes, self.auxiliary, self.internals = body.nodes, body.auxiliary, body.internals
+        self.nodes, self.internals = body.nodes, body.internals
         self.conditions = self.stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
@@ -149,7 +148,7 @@ class Simulation:
     @exclusive
     def _advance(self, times: list[float], dt: float) -> None:
         begin = clock.perf_counter()
-        outcome = self.stepper.advance(times, dt, self._time_step.courant(dt))
+        outcome = self.stepper.advance(times, dt)
         self.steps += outcome.made
         self.time = times[outcome.made - 1] + dt
         self.shortest_step = min(self.shortest_step, dt)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..errors import SceneError
 from ..operators.sources import MOST_SUBSTEPS, STIFFNESS_LIMIT
 from ..physics.smoothing import second_moment
+from ..scene.numerics import Numerics
 from ..scene.scene import Scene
 
 ROUNDING = 1e-9
@@ -63,19 +64,12 @@ class TimeStep:
 
     def __init__(self, scene: Scene, shrinkage: Callable[[], float]):
         self._initial_limit, self._shrinkage = time_step_limit(scene), shrinkage
-        self._per_spacing = scene.material.wave_speed(scene.mesh.dim) / scene.numerics.scheme.spacing(
-            scene.mesh
-        )  # [1/s]
         self.stretch: Stretch | None = None
 
     @property
     def limit(self) -> float:
         """Largest Δt that is allowed now [s]: less than at the start where nodes are closer, or waves faster."""
         return self._initial_limit * self._shrinkage()
-
-    def courant(self, dt: float) -> float:
-        """c_p Δt/Δx of a step, with the least present spacing [-]."""
-        return dt * self._per_spacing / self._shrinkage()
 
     def begin(self, time: float, end: float, steps: int) -> Stretch:
         """The equal steps to a time [s]: those that a run stopped in, or new ones."""
@@ -97,10 +91,12 @@ class TimeStep:
 
 
 def courant_limit(scene: Scene) -> float:
-    """Largest stable c_p Δt/Δx of the wave part, by the scene's scheme (METHOD section 4)."""
-    numerics, dim = scene.numerics, scene.mesh.dim
-    moment = second_moment(numerics.smoothing, ratio=numerics.smoothing_ratio, dim=dim)
-    return numerics.scheme.courant_limit(dim, moment)
+    """Largest stable c_p Δt/Δx of the wave part: 2 √m₂ of sums over neighbours (METHOD section 4)."""
+    numerics = scene.numerics
+    if numerics.scheme.courant_limit is not None:
+        return numerics.scheme.courant_limit
+    moment = second_moment(numerics.smoothing, ratio=numerics.smoothing_ratio, dim=scene.mesh.dim)
+    return 2.0 * math.sqrt(moment)
 
 
 def time_step_limit(scene: Scene) -> float:
@@ -120,17 +116,18 @@ def time_step_limit(scene: Scene) -> float:
             raise SceneError("time_step", numerics.time_step, f"it must be at most {limit * per_courant:.6g} s")
         return numerics.time_step
     if numerics.courant > limit * (1.0 + ROUNDING):
-        raise SceneError(
-            "courant",
-            numerics.courant,
-            f"with kernel {numerics.kernel} and smoothing_ratio {numerics.smoothing_ratio:g} waves are stable "
-            f"up to {limit:.4g}",
-        )
+        raise SceneError("courant", numerics.courant, f"{_described(numerics)} waves are stable up to {limit:.4g}")
     dt = numerics.courant * per_courant
     rate = material.flow_rate(mesh.dim)
     if rate > 0.0 and numerics.source_scheme == "rk4":
         dt = min(dt, 2.0 * MOST_SUBSTEPS * STIFFNESS_LIMIT / rate)
     return dt
+
+
+def _described(numerics: Numerics) -> str:
+    if numerics.scheme.sums is None:
+        return f"with velocity_scheme {numerics.velocity_scheme}"
+    return f"with kernel {numerics.kernel} and smoothing_ratio {numerics.smoothing_ratio:g}"
 
 
 def divide(duration: float, limit: float) -> tuple[int, float]:

@@ -1,24 +1,24 @@
-"""A body on a device: what it is made of, its nodes and its cells."""
+"""A body on a device: what it is made of, and its nodes."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
+from ..errors import SceneError
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..scene.scene import Scene
-from .cells import NodeCells, has_slots, node_cells
-from .nodes import auxiliary_nodes, material_internals, material_nodes
 
 
 @dataclass(frozen=True, kw_only=True)
-class Body:
-    """One material, one kind of cell, and the arrays that every part of a step works on.
+class Body(ABC):
+    """One material, one kind of cell, and the arrays that every scheme has.
 
     Attributes:
         scene: the scene it is of.
@@ -26,11 +26,8 @@ class Body:
         kind: the kind of its cells.
         law: its material's law.
         parameters: the law's parameters.
-        nodes: material nodes (struct of arrays, see `warpsph.state.nodes`).
+        nodes: the nodes, a struct of arrays of the scheme's own.
         internals: what each node remembers of the material, or None.
-        auxiliary: auxiliary nodes.
-        slots: whether `node_cells` has them.
-        node_cells: the cells around each node.
         launcher: launches the kernels that work on it.
     """
 
@@ -41,38 +38,40 @@ class Body:
     parameters: object
     nodes: object
     internals: wp.array | None
-    auxiliary: object
-    slots: bool
-    node_cells: NodeCells
     launcher: Launcher
 
+    @abstractmethod
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,)."""
-        return self.nodes.density.numpy().copy()
 
-    @staticmethod
-    def of(scene: Scene, space: Space, launcher: Launcher) -> Body:
-        """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
-        device, shared = launcher.device, shared_parts(scene, space, launcher)
-        return Body(
-            nodes=material_nodes(scene, space, device),
-            auxiliary=auxiliary_nodes(scene, space, shared["kind"], device),
-            **shared,
-        )
+    def stress(self) -> np.ndarray:
+        """σ of the nodes [Pa], stored components, shape (n, s)."""
+        return self.nodes.point.numpy()["phi"][:, self.space.dim :].copy()
 
 
 def shared_parts(scene: Scene, space: Space, launcher: Launcher) -> dict[str, object]:
-    """What every scheme's body of a scene has alike, by attribute."""
-    law, kind, device = scene.material.law(space), scene.mesh.kind, launcher.device
-    slots = has_slots(scene.mesh)
+    """What every scheme's body of a scene has alike, by attribute.
+
+    Raises:
+        SceneError: the law can not be integrated by the scene's source scheme.
+    """
+    law, scheme = scene.material.law(space), scene.numerics.source_scheme
+    if scheme not in law.source_schemes:
+        takes = ", ".join(law.source_schemes)
+        raise SceneError("source_scheme", scheme, f"the law of {type(scene.material).__name__} takes {takes} only")
     return {
         "scene": scene,
         "space": space,
-        "kind": kind,
+        "kind": scene.mesh.kind,
         "law": law,
         "parameters": law.fill(scene.material),
-        "internals": material_internals(scene, law, space, device),
-        "slots": slots,
-        "node_cells": node_cells(scene.mesh, slots, device),
+        "internals": _internals(scene, law, space, launcher.device),
         "launcher": launcher,
     }
+
+
+def _internals(scene: Scene, law: Law, space: Space, device: wp.Device) -> wp.array | None:
+    """The internal variables of the nodes at the start; None for a law without any."""
+    if not law.internals:
+        return None
+    return wp.array(scene.initial_internals, dtype=space.vec(len(law.internals)), device=device)

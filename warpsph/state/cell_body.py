@@ -10,7 +10,7 @@ from ..device.launching import Launcher
 from ..physics.space import Space
 from ..scene.scene import Scene
 from .body import Body, shared_parts
-from .cells import cell_table
+from .cells import NodeCells, cell_table, has_slots, node_cells
 
 # Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
 FORCES, CONDITIONS, FLOW = 0, 1, 2
@@ -39,28 +39,37 @@ def cell_node_types(space: Space) -> tuple[type, type]:
         acceleration: wp.array(dtype=types.vector)
         books: wp.array(dtype=wp.vec3d)
         strained: wp.array(dtype=space.real)
+        sharpened: wp.array(dtype=types.stress)
+        flowed: wp.array(dtype=space.real)
 
     return Half, CellNodes
 
 
 @dataclass(frozen=True, kw_only=True)
 class CellBody(Body):
-    """A body as the scheme `cells` keeps it: auxiliary nodes remember nothing, and nothing of them is kept.
+    """A body as the scheme `cells` keeps it.
 
     Attributes:
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
             all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
-            `strained` ∫ |d| dt since the step was last measured.
+            `strained` ∫ |d| dt since the step was last measured; `sharpened` K σ [Pa], where it is asked for;
+            `flowed` of a law that flows, 1 in a step in which it does, then less and less.
         corners: node indices of each cell, shape (m, c).
+        cell_mass: mass of each cell [kg], constant, shape (m,).
+        slots: whether `node_cells` has them.
+        node_cells: the cells around each node.
     """
 
     corners: wp.array
+    cell_mass: wp.array
+    slots: bool
+    node_cells: NodeCells
 
     @staticmethod
-    def of(scene: Scene, space: Space, launcher: Launcher) -> "CellBody":
-        """The body of a scene in its initial state."""
+    def of(scene: Scene, space: Space, launcher: Launcher, *, sharp: bool) -> "CellBody":
+        """The body of a scene in its initial state; `sharp` if stresses are to be sharpened."""
         mesh, device, types = scene.mesh, launcher.device, space.types
         Half, CellNodes = cell_node_types(space)
         n, x, nodes = len(mesh.nodes), mesh.nodes - mesh.middle, CellNodes()
@@ -82,9 +91,26 @@ class CellBody(Body):
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
-        corners = cell_table(mesh, mesh.kind, device)
-        return CellBody(nodes=nodes, auxiliary=None, corners=corners, **shared_parts(scene, space, launcher))
+        shared, slots = shared_parts(scene, space, launcher), has_slots(mesh)
+        nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
+        nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)
+        return CellBody(
+            nodes=nodes,
+            corners=cell_table(mesh, mesh.kind, device),
+            cell_mass=wp.array(scene.material.density * mesh.cell_volumes(), dtype=space.real, device=device),
+            slots=slots,
+            node_cells=node_cells(mesh, slots, device),
+            **shared,
+        )
 
     def density(self) -> np.ndarray:
-        """ρ = m/V of the nodes [kg/mᵈ], shape (n,)."""
-        return self.nodes.mass.numpy() / self.nodes.volume.numpy()
+        """ρ of the nodes [kg/mᵈ], shape (n,): m over the volume of their cells as they are now."""
+        mesh = self.scene.mesh
+        if self.scene.large_displacements:
+            mesh = mesh.with_nodes(mesh.nodes + self.nodes.displacement.numpy())
+        return self.nodes.mass.numpy() / mesh.node_volumes()[0]
+
+    def stress(self) -> np.ndarray:
+        """The stress that forces come from [Pa], sharpened if any is, stored components, shape (n, s)."""
+        sharp = len(self.nodes.sharpened) == len(self.nodes.point)
+        return self.nodes.sharpened.numpy().copy() if sharp else super().stress()

@@ -1,6 +1,5 @@
-"""Cells on the device: which cells a node is a corner of, and what a pass over the cells leaves of each."""
+"""Cells on the device: their corners, and which cells a node is a corner of."""
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -10,9 +9,6 @@ from ..device.arrays import natural, packed
 from ..errors import SceneError
 from ..mesh.kinds import CellKind
 from ..mesh.mesh import Mesh
-from ..physics.space import Space
-
-ALIGNED = 4  # a cell begins at a multiple of so many numbers, for vector registers
 
 
 @wp.struct
@@ -89,81 +85,3 @@ def corner_place(kind: CellKind) -> wp.Function:
         return cell, place - wp.static(kind.corners) * cell
 
     return place_of
-
-
-@dataclass(frozen=True)
-class CellStore:
-    """What is kept of each cell from one pass to the next, as numbers side by side.
-
-    Attributes:
-        columns: number of hourglass modes kept; at least one, since Warp has no matrix without columns.
-        Cell: of one cell ∇φ in its middle `gradient`, `modes` (a column each), `frame` (∇ξ_a in row a), `reach`,
-            how far towards its corners strain rates may be taken.
-        by_number: whether the same number of consecutive cells stands side by side in memory, for a GPU whose
-            threads read it together, or all the numbers of a cell, for the vector registers of a CPU.
-        size: how many numbers a cell has, spare ones included.
-        write: (cell, Cell, numbers) → nothing.
-        read: (cell, numbers) → Cell.
-        packed: (numbers) → nothing: for the compiler, see `warpsph.device.arrays`.
-    """
-
-    columns: int
-    Cell: type
-    by_number: bool
-    size: int
-    write: wp.Function
-    read: wp.Function
-    packed: wp.Function
-
-    def new(self, m: int, space: Space, device: wp.Device) -> wp.array:
-        """The numbers of m cells, zero, shape (size, m)."""
-        if self.by_number:
-            return wp.zeros((self.size, m), dtype=space.real, device=device)
-        return wp.zeros((m, self.size), dtype=space.real, device=device).transpose()
-
-
-@cache
-def cell_store(space: Space, kind: CellKind, by_number: bool) -> CellStore:
-    """How the cells of a kind are kept."""
-    d, size, columns = space.dim, space.types.size, max(1, len(kind.modes))
-    modes_at = size * d  # where a cell's modes begin among its numbers, its frame and its reach
-    frame_at = modes_at + size * columns
-    reach_at = frame_at + d * d
-    packed_numbers = packed(wp.array2d(dtype=space.real), axis=1 if by_number else 0)
-
-    @wp.struct
-    class Cell:
-        gradient: space.types.phi_gradient
-        modes: space.mat(size, columns)
-        frame: space.types.tensor
-        reach: space.real
-
-    @wp.func
-    def write(a: int, cell: Cell, numbers: wp.array2d(dtype=space.real)):
-        packed_numbers(numbers)
-        for i in range(wp.static(size)):
-            for j in range(wp.static(d)):
-                numbers[d * i + j, a] = cell.gradient[i, j]
-            for j in range(wp.static(columns)):
-                numbers[modes_at + columns * i + j, a] = cell.modes[i, j]
-        for i in range(wp.static(d)):
-            for j in range(wp.static(d)):
-                numbers[frame_at + d * i + j, a] = cell.frame[i, j]
-        numbers[reach_at, a] = cell.reach
-
-    @wp.func
-    def read(a: int, numbers: wp.array2d(dtype=space.real)):
-        cell = Cell()
-        for i in range(wp.static(size)):
-            for j in range(wp.static(d)):
-                cell.gradient[i, j] = numbers[d * i + j, a]
-            for j in range(wp.static(columns)):
-                cell.modes[i, j] = numbers[modes_at + columns * i + j, a]
-        for i in range(wp.static(d)):
-            for j in range(wp.static(d)):
-                cell.frame[i, j] = numbers[frame_at + d * i + j, a]
-        cell.reach = numbers[reach_at, a]
-        return cell
-
-    whole = -(-(reach_at + 1) // ALIGNED) * ALIGNED
-    return CellStore(columns, Cell, by_number, whole, write, read, packed_numbers)

@@ -1,13 +1,42 @@
-"""The two node sets: material nodes carry the mass, auxiliary nodes stand in the middle of their cells."""
+"""The two node sets of sums: material nodes carry the mass, auxiliary nodes stand in the middle of their cells."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
-from ..materials.law import Law
+from ..device.launching import Launcher
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..scene.scene import Scene
+from .body import Body, shared_parts
 from .cells import cell_table
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumsBody(Body):
+    """A body as schemes of sums over neighbours keep it.
+
+    Attributes:
+        nodes: material nodes, see `material_nodes`.
+        auxiliary: auxiliary nodes, see `auxiliary_nodes`.
+    """
+
+    auxiliary: object
+
+    @staticmethod
+    def of(scene: Scene, space: Space, launcher: Launcher) -> "SumsBody":
+        """The body of a scene in its initial state; auxiliary nodes are still to be centred."""
+        device, shared = launcher.device, shared_parts(scene, space, launcher)
+        return SumsBody(
+            nodes=material_nodes(scene, space, device),
+            auxiliary=auxiliary_nodes(scene, space, shared["kind"], device),
+            **shared,
+        )
+
+    def density(self) -> np.ndarray:
+        """ρ of the nodes [kg/mᵈ], shape (n,)."""
+        return self.nodes.density.numpy().copy()
 
 
 def material_nodes(scene: Scene, space: Space, device: wp.Device):
@@ -43,24 +72,8 @@ def material_nodes(scene: Scene, space: Space, device: wp.Device):
 
 
 def initial_smoothing_length(scene: Scene, volume: np.ndarray) -> np.ndarray:
-    """h₀ [m], shape (n,): (smoothing ratio) · (V₀)^{1/d}, the ratio times the local spacing.
-
-    Where kernels follow the cells, the ratio times the largest stretch of the node's cells: lists must then hold
-    all that a stretched kernel sees.
-    """
-    mesh, ratio = scene.mesh, scene.numerics.smoothing_ratio
-    if not scene.numerics.scheme.follows_cells:
-        return ratio * volume ** (1.0 / mesh.dim)
-    stretch, largest = mesh.cell_stretches[:, 0], np.zeros(len(volume))
-    np.maximum.at(largest, mesh.cells, stretch[:, None])
-    return ratio * largest
-
-
-def material_internals(scene: Scene, law: Law, space: Space, device: wp.Device) -> wp.array | None:
-    """The internal variables of the material nodes at the start; None for a law without any."""
-    if not law.internals:
-        return None
-    return wp.array(scene.initial_internals, dtype=space.vec(len(law.internals)), device=device)
+    """h₀ [m], shape (n,): (smoothing ratio) · (V₀)^{1/d}, the ratio times the local spacing."""
+    return scene.numerics.smoothing_ratio * volume ** (1.0 / scene.mesh.dim)
 
 
 def auxiliary_nodes(scene: Scene, space: Space, kind: CellKind, device: wp.Device):

@@ -1,3 +1,1 @@
-"""The time step; importing it makes the schemes known."""
-
-from . import scheme  # noqa: F401
+"""The time step."""

@@ -1,9 +1,9 @@
 """The pair lists of both node sets around each other, renewed when nodes have used up the lists' skin."""
 
 from ..device.compiling import load_kernels
-from ..operators.motion import SmallMotion, centre_kernel
-from ..state.body import Body
+from ..operators.motion import Motion, SmallMotion, centre_kernel
 from ..state.clock import Clock
+from ..state.nodes import SumsBody
 from ..state.pairs import SKIN, Neighbours, Search
 
 
@@ -18,11 +18,10 @@ class PairLists:
         around_auxiliary, around_nodes: the lists.
         motion: moves the nodes.
         builds: how often the lists were built.
-        shrinkage: least time of a wave from node to node over the initial one, at most 1, as of the last lists.
         kernels: the kernels that make them and move the nodes.
     """
 
-    def __init__(self, body: Body, clock: Clock):
+    def __init__(self, body: SumsBody, clock: Clock):
         scene, launcher, nodes, auxiliary = body.scene, body.launcher, body.nodes, body.auxiliary
         # Before all else: the lists' grids are sized by where the nodes are.
         centre = centre_kernel(body.space, body.kind)
@@ -32,13 +31,12 @@ class PairLists:
         skin = SKIN * scene.mesh.spacing if scene.large_displacements else 0.0
         self.motion = SmallMotion(body)
         if scene.large_displacements:
-            moving = scene.numerics.scheme.motion
-            self.motion = moving(body, skin=skin, outdated=self._outdated, faults=clock.faults)
+            self.motion = Motion(body, skin=skin, outdated=self._outdated)
         search = Search(support=scene.numerics.smoothing.support, spacing=scene.mesh.spacing, skin=skin)
         self._auxiliary = Neighbours(body.space, launcher, targets=auxiliary, sources=nodes, search=search)
         self._nodes = Neighbours(body.space, launcher, targets=nodes, sources=auxiliary, search=search)
         self.around_auxiliary, self.around_nodes = self._auxiliary.pairs, self._nodes.pairs
-        self.builds, self.shrinkage = 0, 1.0
+        self.builds = 0
         self.kernels = (*self._auxiliary.kernels, *self._nodes.kernels, *self.motion.kernels)
 
     def refresh(self) -> None:
@@ -47,5 +45,4 @@ class PairLists:
         self._nodes.build()
         self.motion.mark()
         self._outdated.zero_()
-        self.shrinkage = self.motion.shrinkage()
         self.builds += 1

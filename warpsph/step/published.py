@@ -11,17 +11,17 @@ import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..materials.law import Law
+from ..mesh.kinds import GRID_KINDS
 from ..operators.conditions import Conditions, ConditionTypes
-from ..operators.motion import Motion, half_step_gradient, initial_gradient
-from ..operators.neighbour_sums import NeighbourSums, batch_on, neighbour_sums, round_metric
+from ..operators.motion import half_step_gradient, initial_gradient
+from ..operators.neighbour_sums import NeighbourSums, batch_on, neighbour_sums
 from ..physics.space import Space
 from ..physics.waves import wave_rate
-from ..scene.scheme import Scheme, wave_limit
-from ..state.body import Body
+from ..scene.scheme import Scheme, Sums
 from ..state.clock import HALF
+from ..state.nodes import SumsBody
 from ..state.pairs import PairList
-
-LARGEST_SUPPORT = 6.0  # [Δx]
+from .sums import SumsStepper
 
 
 @cache
@@ -68,7 +68,7 @@ class PublishedFluxes:
     def __init__(
         self,
         advance_velocity: Callable[[Space], wp.Function],
-        body: Body,
+        body: SumsBody,
         *,
         conditions: Conditions,
         around_auxiliary: PairList,
@@ -84,9 +84,6 @@ class PublishedFluxes:
             space, law, sums, advance_velocity(space), to_half_step, conditions.types
         )
         self.kernels = (self._to_auxiliary, self._to_nodes)
-
-    def set_courant(self, courant: float) -> None:
-        """Nothing: the published schemes know the time step only."""
 
     def to_auxiliary(self, dt: wp.array) -> None:
         """Steps 3-6: φ_aux = value of φ_s, then φ_aux^{n+1/2} = φ_aux − (Δt/2) div f(φ_s)."""
@@ -110,7 +107,7 @@ class PublishedFluxes:
 
 @cache
 def _to_auxiliary_kernel(space: Space, law: Law, sums: NeighbourSums):
-    real, metric_of, rate = space.real, round_metric(space), wave_rate(space, law.Parameters)
+    real, rate = space.real, wave_rate(space, law.Parameters)
 
     @forward_kernel
     def to_auxiliary(
@@ -123,8 +120,8 @@ def _to_auxiliary_kernel(space: Space, law: Law, sums: NeighbourSums):
     ):
         a = first + wp.tid()
         point = auxiliary.point[a]
-        metric = metric_of(auxiliary.smoothing_length[a])
-        around = sums.collect(a, point.x, metric, point.phi, pairs, nodes.point, nodes.volume)
+        h = auxiliary.smoothing_length[a]
+        around = sums.collect(a, point.x, h, point.phi, pairs, nodes.point, nodes.volume)
         phi = sums.value(around)  # 3
         minus_div_f = rate(sums.gradient(around, phi), real(1.0) / auxiliary.density[a], material)  # 4-5
         auxiliary.point[a].phi = phi + real(0.5) * time_step[0] * minus_div_f  # 6
@@ -141,7 +138,7 @@ def _to_nodes_kernel(
     to_half_step: wp.Function,
     conditions: ConditionTypes,
 ):
-    phi, metric_of, rate = space.phi, round_metric(space), wave_rate(space, law.Parameters)
+    phi, rate = space.phi, wave_rate(space, law.Parameters)
 
     @forward_kernel
     def to_nodes(
@@ -155,8 +152,8 @@ def _to_nodes_kernel(
     ):
         i = first + wp.tid()
         dt, point = time_step[0], nodes.point[i]
-        metric = metric_of(nodes.smoothing_length[i])
-        around = sums.collect(i, point.x, metric, point.phi, pairs, auxiliary.point, auxiliary.volume)
+        h = nodes.smoothing_length[i]
+        around = sums.collect(i, point.x, h, point.phi, pairs, auxiliary.point, auxiliary.volume)
         phi_half = conditions.apply(i, sums.value(around), HALF, table)  # 7
         grad, volume_ratio = to_half_step(sums.gradient(around, phi_half), dt)
         minus_div_f = rate(grad, volume_ratio / nodes.density[i], material)  # 8-9
@@ -181,18 +178,15 @@ def published_scheme(name: str, *, meaning: str, advance_velocity: Callable[[Spa
     """
 
     @wraps(advance_velocity, updated=())  # a registered scheme belongs to the place that makes its step
-    def fluxes(body: Body, **more) -> PublishedFluxes:
+    def fluxes(body: SumsBody, **more) -> PublishedFluxes:
         return PublishedFluxes(advance_velocity, body, **more)
 
     return Scheme(
         name=name,
         meaning=meaning,
-        fluxes=fluxes,
-        motion=Motion,
-        unloads=False,
-        follows_cells=False,
-        courant_limit=wave_limit,
-        largest_support=lambda dim: LARGEST_SUPPORT,
+        stepper=SumsStepper,
+        kinds=tuple(GRID_KINDS.values()),
+        sums=Sums(fluxes=fluxes),
     )
 
 

@@ -39,27 +39,21 @@ class Stepper(ABC):
     def step(self) -> None:
         """Advance the nodes by the clock's Δt; it ends with the clock's tick."""
 
-    def set_courant(self, courant: float) -> None:
-        """The Courant number c_p Δt/Δx of the steps to come; most schemes need not know."""
-        return
-
     def arrays_recorded(self) -> tuple[int, ...]:
         """Addresses of arrays that may be replaced: the step is then recorded anew."""
         return ()
 
-    def advance(self, times: Sequence[float], dt: float, courant: float) -> Outcome:
+    def advance(self, times: Sequence[float], dt: float) -> Outcome:
         """Make a step from each of the times to Δt later; fewer when the host is needed before.
 
         Args:
             times: where the steps begin [s], at most `LONGEST_RUN` of them.
             dt: time step [s].
-            courant: c_p Δt/Δx of the least present spacing.
 
         Returns:
             How many were made, at least one. When something can not be true, the last step is the first with it.
         """
         self.clock.begin(times, dt)
-        self.set_courant(courant)
         self._record().run()
         outcome = self.clock.outcome()
         if outcome.outdated is not None and outcome.fault is None:

@@ -9,8 +9,8 @@ from ..operators.sources import sources
 from ..operators.surface.release import FreeSurfaceConditions
 from ..physics.space import Space
 from ..scene.scene import Scene
-from ..state.body import Body
 from ..state.clock import Clock
+from ..state.nodes import SumsBody
 from .lists import PairLists
 from .step import Stepper
 
@@ -33,13 +33,11 @@ class SumsStepper(Stepper):
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
-        scheme, device = scene.numerics.scheme, launcher.device
-        self.body = Body.of(scene, space, launcher)
+        self.body = SumsBody.of(scene, space, launcher)
         clock = Clock(scene.body_force, scene.boundary.functions, space, launcher)
         self.lists = PairLists(self.body, clock)
         self._sources = sources(scene, self.body.law, self.body.parameters, space, launcher)
         if scene.free_surface is None:
-            turns = scheme.unloads and scene.large_displacements and space.dim > 1
             self.conditions = Conditions(
                 scene.boundary,
                 len(scene.mesh.nodes),
@@ -47,13 +45,12 @@ class SumsStepper(Stepper):
                 launcher=launcher,
                 clock=clock,
                 moves=scene.large_displacements,
-                turns=turns,
             )
         else:
             self.conditions = FreeSurfaceConditions(
                 scene, self.body.nodes, space=space, launcher=launcher, clock=clock
             )
-        self.fluxes = scheme.fluxes(
+        self.fluxes = scene.numerics.scheme.sums.fluxes(
             self.body,
             conditions=self.conditions,
             around_auxiliary=self.lists.around_auxiliary,
@@ -61,27 +58,22 @@ class SumsStepper(Stepper):
         )
         super().__init__(launcher, clock, parts=(self.lists, self.conditions))
         pieces = (self.clock, self._sources, self.fluxes, *self.parts)
-        load_kernels([kernel for piece in pieces for kernel in piece.kernels], device)
+        load_kernels([kernel for piece in pieces for kernel in piece.kernels], launcher.device)
         for part in self.parts:
             part.refresh()
         self.clock.begin([0.0], 0.0)
-        self.fluxes.set_courant(0.0)
         self.conditions.apply(self.body.nodes)
         self._initial_spin(scene)
 
     @property
     def shrinkage(self) -> float:
-        """Least time of a wave from node to node over the initial one, at most 1, as of the last lists."""
-        return self.lists.shrinkage
+        """1: published schemes keep their step, since their viscosity depends on it."""
+        return 1.0
 
     @property
     def builds(self) -> int:
         """How often the pair lists were built."""
         return self.lists.builds
-
-    def set_courant(self, courant: float) -> None:
-        """The Courant number c_p Δt/Δx of the steps to come."""
-        self.fluxes.set_courant(courant)
 
     def arrays_recorded(self) -> tuple[int, ...]:
         """Addresses of the lists."""

@@ -2,9 +2,7 @@
 
 Tractions vanish on every face that a surface node lies on: σ ← P σ P, P the projector onto the directions that
 lie in all of its faces. On a smooth surface P = 1 − n n; along the edge of a solid P = e e; at a corner, of two
-edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept. Where tractions vanish by elastic
-unloading, strains along the m directions taken out do it, and with them σ ← P σ P − λ/(m λ + 2G) tr(σ − P σ)
-(P + the direction out of plane).
+edges in the plane or three faces in a solid, P = 0. σ33 in plane strain is kept.
 
 At the end of a wall a velocity condition beats the traction condition: only the directions that nobody moves are
 freed, so there n stands for its part along them. Without that a slope's toe would carry the full overburden on its
@@ -59,7 +57,6 @@ class FreeSurfaceConditions(Conditions):
         self.table.conditions = walls
         self.table.row = self._scan.row
         self.table.projector = wp.zeros(len(candidates), dtype=space.types.tensor, device=device)
-        self.table.unloading = wp.array(_unloading(scene), dtype=space.real, device=device)
         self._turned = wp.zeros(len(candidates), dtype=space.real, device=device)
         self.outdated = clock.new_flag()
         self._kernel = apply_kernel(space, self.types, moves)
@@ -103,53 +100,23 @@ class FreeSurfaceConditions(Conditions):
 @cache
 def free_surface_types(space: Space, walls: ConditionTypes) -> ConditionTypes:
     """The walls' table and function, with the free surface: P of each candidate after all else."""
-    phi, types, real = space.phi, space.types, space.real
+    phi, types = space.phi, space.types
 
     @wp.struct
     class Table:
         conditions: walls.Table
         row: wp.array(dtype=wp.int32)
         projector: wp.array(dtype=types.tensor)
-        unloading: wp.array(dtype=real)
-
-    @wp.func
-    def in_space(sigma: types.stress):
-        """σ11 + … + σdd."""
-        total = real(0.0)
-        for k in range(wp.static(space.dim)):
-            total += sigma[k]
-        return total
-
-    @wp.func
-    def released(sigma: types.stress, P: types.tensor, unloading: wp.array(dtype=real)):
-        left = space.stress.transform(sigma, P)
-        lost = in_space(sigma) - in_space(left)
-        taken, rest = wp.int32(0), wp.trace(P)
-        for k in range(wp.static(space.dim)):  # compared, not rounded: as an index NaN would lead anywhere
-            if rest < real(k) + real(0.5):
-                taken += 1
-        return left - unloading[taken] * lost * space.stress.transform(space.stress.spherical(real(1.0)), P)
 
     @wp.func
     def apply(i: int, values: phi.phi, when: int, table: Table):
         result = walls.apply(i, values, when, table.conditions)
         c = table.row[i]
         if c >= 0:
-            sigma = released(phi.stress(result), table.projector[c], table.unloading)
-            result = phi.with_stress(result, sigma)
+            result = phi.with_stress(result, space.stress.transform(phi.stress(result), table.projector[c]))
         return result
 
     return ConditionTypes(Table, apply)
-
-
-def _unloading(scene: Scene) -> list[float]:
-    """λ/(m λ + 2G) for m directions taken out; zero where tractions are cut off."""
-    continuum = scene.mesh.continuum
-    if not scene.numerics.scheme.unloads:
-        return [0.0] * (continuum.dim + 1)
-    stiffness, k = scene.material.stiffness(continuum), continuum.pairs.index((0, 1))
-    lame, shear = float(stiffness[0, 1]), float(stiffness[k, k])
-    return [0.0, *(lame / (m * lame + 2.0 * shear) for m in range(1, continuum.dim + 1))]
 
 
 @cache

@@ -8,7 +8,7 @@ from ...cli.catalogue import load
 from ..case import Case, Picture, ReportTable, Row, Section
 from ..drawing import Curve, Panel, diagram, draw_fields
 from ..prose import prose
-from ..runs import Run
+from ..runs import published
 
 SCENE = "gravity_slope"
 COURANTS = (1.0, 0.5, 0.25)
@@ -19,7 +19,10 @@ TIMES = (5.0, 15.0, 25.0, 35.0)  # of the frames in full [s]
 def case(quick: bool) -> Case:
     """Three Courant numbers; the scene's short form when quick."""
     settings, times = ((), TIMES) if not quick else (load(SCENE).short, (1.0, 2.0, 3.5, 5.0))
-    runs = [Run(f"{SCENE}_{courant:g}", SCENE, (*settings, f"courant={courant:g}"), times) for courant in COURANTS]
+    runs = [
+        published(f"{SCENE}_{courant:g}", SCENE, (*settings, f"courant={courant:g}"), times)
+        for courant in COURANTS
+    ]
     return Case(SCENE, tuple(runs), section)
 
 

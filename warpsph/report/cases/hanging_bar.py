@@ -7,10 +7,10 @@ import numpy as np
 from ..case import Case, Picture, Row, Section
 from ..drawing import Curve, Panel, diagram, draw_fields
 from ..prose import prose
-from ..runs import Run
+from ..runs import published
 
-COMPLETE = Run("hanging_bar_complete", "hanging_bar", ("velocity_scheme=taylor",), (0.2,))
-PUBLISHED = Run("hanging_bar_published", "hanging_bar", (), (0.2,))
+COMPLETE = published("hanging_bar_complete", "hanging_bar", ("velocity_scheme=taylor",), (0.2,))
+PUBLISHED = published("hanging_bar_published", "hanging_bar", (), (0.2,))
 MAGNIFIED = 200.0  # displacements in the figure, as in the paper
 
 

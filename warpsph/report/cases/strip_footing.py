@@ -7,7 +7,7 @@ import numpy as np
 from ..case import Case, Picture, ReportTable, Row, Section
 from ..drawing import BRIGHT, Curve, Panel, diagram, draw_cells, draw_fields, grid, save_picture
 from ..prose import prose
-from ..runs import Run
+from ..runs import published
 
 SCENE = "strip_footing"
 SLOW = ("acceleration=3e-4", "duration=10.119")  # a tenth of the acceleration, to the same settlement
@@ -17,11 +17,11 @@ TIMES = (0.4, 1.0, 1.53, 2.18, 3.2)  # of the paper's figure 23 [s]
 
 def case(quick: bool) -> Case:
     """Both materials, and the perfectly viscoplastic one at other spacings and, in full, loaded slowly."""
-    runs = [Run(SCENE, SCENE, (), TIMES), Run(f"{SCENE}_soft", SCENE, ("hardening=-1e6",), TIMES)]
+    runs = [published(SCENE, SCENE, (), TIMES), published(f"{SCENE}_soft", SCENE, ("hardening=-1e6",), TIMES)]
     for spacing in ("0.2",) if quick else ("0.2", "0.05"):
-        runs.append(Run(f"{SCENE}_{spacing}", SCENE, (f"spacing={spacing}",)))
+        runs.append(published(f"{SCENE}_{spacing}", SCENE, (f"spacing={spacing}",)))
     if not quick:
-        runs.append(Run(f"{SCENE}_slow", SCENE, SLOW))
+        runs.append(published(f"{SCENE}_slow", SCENE, SLOW))
     return Case(SCENE, tuple(runs), section)
 
 
