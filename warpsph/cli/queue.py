@@ -18,7 +18,7 @@ from ..errors import DamagedError
 from ..simulation.device import THREADS, all_cores
 from .parent import end_with_parent, for_child
 from .scene_run import SceneRun
-from .stopping import TERMINAL, terminal_waits
+from .stopping import TERMINAL, starting_processes
 
 try:
     from multiprocessing import resource_tracker
@@ -35,19 +35,19 @@ class Processes(ProcessPoolExecutor):
 
     def submit(self, *arguments, **named):
         """As of every executor; it may start a process."""
-        with terminal_waits():
+        with starting_processes():
             return super().submit(*arguments, **named)
 
 
 def processes(jobs: int) -> Executor:
     """Makes each run in a process of this machine, which share the cores and end with this one."""
-    if resource_tracker is not None:
-        with terminal_waits():
-            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     threads = max(1, all_cores() // jobs)
     arguments = (threads, for_child())
-    return Processes(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
+    with starting_processes():  # or a semaphore would be left that nobody knows of yet
+        if resource_tracker is not None:
+            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
+        return Processes(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
 
 
 def make_missing(
