@@ -7,7 +7,7 @@ import pytest
 
 from warpsph import Box, Elastic, Numerics, Scene, SceneError, Shape
 from warpsph.device.precision import PRECISIONS
-from warpsph.mesh.kinds import GRID_KINDS, HEXAHEDRON, KINDS, QUAD, TETRAHEDRON, TRIANGLE
+from warpsph.mesh.kinds import GRID_KINDS, HEXAHEDRON, KINDS, QUAD, SEGMENT, TETRAHEDRON, TRIANGLE
 from warpsph.mesh.mesh import Mesh
 from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
@@ -250,3 +250,22 @@ def test_a_number_of_corners_that_no_kind_has_is_refused():
     five = Mesh(**(vars(mesh) | {"cells": np.zeros((1, 5), dtype=int)}))
     with pytest.raises(SceneError, match=r"5 corners in 2D.*triangle \(2D, 3\), quad \(2D, 4\)"):
         _ = five.kind
+
+
+@pytest.mark.parametrize("kind", [SEGMENT, TRIANGLE, QUAD], ids=lambda kind: kind.name)
+def test_product_rule_integrates_products_of_two_shares(kind):
+    """∫ N_i N_j is (1 + δ)/6 over a segment, (1 + δ)/24 over a triangle, over a quad that of two segments."""
+    segment = (1.0 + np.eye(2)) / 6.0
+    exact = {
+        "segment": segment,
+        "triangle": (1.0 + np.eye(3)) / 24.0,
+        "quad": np.kron(segment, segment),
+    }[kind.name]
+    found = sum(weight * np.outer(shares, shares) for weight, shares, _ in kind.product_rule)
+    assert found == pytest.approx(exact, abs=1e-15)
+    assert sum(weight for weight, _, _ in kind.product_rule) == pytest.approx(kind.volume, abs=1e-15)
+
+
+@every_kind
+def test_shares_are_one_at_their_corner(kind):
+    assert [kind.shares(point).tolist() for point in kind.points] == np.eye(kind.corners).tolist()

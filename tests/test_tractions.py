@@ -1,11 +1,10 @@
-"""Loads on edges, by the condition that docs/conditions.md adds, against exact states and waves."""
+"""Tractions put in place in the stresses of edge nodes, as published schemes have loads: exact states, waves."""
 
 import math
 
 import numpy as np
 import pytest
 
-from tests.documents import ROOT, blocks, run_as_module
 from warpsph import (
     Box,
     Elastic,
@@ -19,6 +18,7 @@ from warpsph import (
     Scene,
     SceneError,
     Simulation,
+    Traction,
     edge,
     tag,
     where,
@@ -32,13 +32,6 @@ STRESS = {1: (3e3,), 2: (3e3, -1e3, 2e3, 500.0), 3: (3e3, -1e3, 2e3, 500.0, 700.
 PLATE = Box((1.0, 0.5), 0.25)
 
 
-@pytest.fixture(scope="module")
-def traction(tmp_path_factory):
-    """The class `Traction` of the page."""
-    (block,) = blocks(ROOT / "docs/conditions.md", "python")
-    return run_as_module("traction", block, tmp_path_factory.mktemp("conditions")).Traction
-
-
 def tensor(stored, continuum):
     """Stored stress components as a symmetric d × d matrix, without σ33 of plane strain."""
     full = np.zeros((3, 3))
@@ -47,11 +40,11 @@ def tensor(stored, continuum):
     return full[: continuum.dim, : continuum.dim]
 
 
-def loads_of(mesh, stress, traction):
+def loads_of(mesh, stress):
     """A load on every side, the one that a uniform stress has there."""
     normals = mesh.face_normals()
     return [
-        traction(edge(name), traction=tuple(stress @ normals[mesh.face_side == side][0]))
+        Traction(edge(name), traction=tuple(stress @ normals[mesh.face_side == side][0]))
         for side, name in enumerate(mesh.continuum.edges)
     ]
 
@@ -59,7 +52,7 @@ def loads_of(mesh, stress, traction):
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("angle", [0.0, 0.5])
 @pytest.mark.parametrize("dim", [1, 2, 3])
-def test_a_uniform_stress_is_in_equilibrium_with_its_tractions(dim, angle, scheme, device, traction):
+def test_a_uniform_stress_is_in_equilibrium_with_its_tractions(dim, angle, scheme, device):
     """With all its components, in a box however it stands, at faces, edges and corners: nothing moves.
 
     Normals are kept to 12 digits, hence stresses to 1e-12 of the largest, and more where steps add that up.
@@ -73,7 +66,7 @@ def test_a_uniform_stress_is_in_equilibrium_with_its_tractions(dim, angle, schem
         shape=shape,
         material=SOIL,
         stress=lambda *x: STRESS[dim],
-        conditions=loads_of(mesh, tensor(STRESS[dim], mesh.continuum), traction),
+        conditions=loads_of(mesh, tensor(STRESS[dim], mesh.continuum)),
         duration=1.0,
         numerics=Numerics(velocity_scheme=scheme),
     )
@@ -90,7 +83,7 @@ def pull(t):
     return math.sin(0.5 * math.pi * min(max(t, 0.0) / 0.03, 1.0)) ** 4
 
 
-def error_of_wave(size, cells, scheme, device, traction):
+def error_of_wave(size, cells, scheme, device):
     """Root mean square errors of σ11 and ρ c v1 over the load, when its wave has almost come to the other end."""
     dim = len(size)
     scene = Scene(
@@ -98,7 +91,7 @@ def error_of_wave(size, cells, scheme, device, traction):
         material=SOIL,
         conditions=[
             Roller(edge("left")),
-            traction(edge("right"), traction=(1.0,) + (0.0,) * (dim - 1), factor=pull),
+            Traction(edge("right"), traction=(1.0,) + (0.0,) * (dim - 1), factor=pull),
             *(Roller(edge(name)) for name in ("bottom", "top")[: 2 * (dim - 1)]),
         ],
         duration=0.9 / SOIL.wave_speed(dim),
@@ -120,19 +113,19 @@ def error_of_wave(size, cells, scheme, device, traction):
         ((1.0,), "blanc-pastor", 0.7, 1.1),  # its viscosity ∝ Δx²/Δt is of first order
     ],
 )
-def test_wave_of_an_end_that_is_pulled(size, scheme, low, high, device, traction):
+def test_wave_of_an_end_that_is_pulled(size, scheme, low, high, device):
     """d'Alembert: σ11 = t and v1 = t/(ρ c), (L − x)/c later; of second order, from both sides.
 
     In the plane between rollers, at whose ends the load is.
     """
-    coarse, fine = (error_of_wave(size, cells, scheme, device, traction) for cells in (20, 40))
+    coarse, fine = (error_of_wave(size, cells, scheme, device) for cells in (20, 40))
     order = np.log2(coarse / fine)
     assert (low <= order).all() and (order <= high).all()
     assert (fine <= (0.004 if low > 1.0 else 0.045)).all()
 
 
-def test_a_load_between_a_roller_and_a_free_edge_is_in_equilibrium(device, precision, traction):
-    """A block in plane strain: σ11 = t, σ33 = ν t, all else zero, with a free edge above."""
+def test_a_load_between_a_roller_and_a_free_edge_is_in_equilibrium(device, precision):
+    """A block in plane strain: σ11 = t, σ33 = ν t, all else zero, with a bare edge above."""
     expected = (1e3, 0.0, 0.0, SOIL.poisson_ratio * 1e3)
     scene = Scene(
         shape=PLATE,
@@ -141,7 +134,7 @@ def test_a_load_between_a_roller_and_a_free_edge_is_in_equilibrium(device, preci
         conditions=[
             Roller(edge("left")),
             Roller(edge("bottom")),
-            traction(edge("right"), traction=(1e3, 0.0)),
+            Traction(edge("right"), traction=(1e3, 0.0)),
             Free(edge("top")),
         ],
         duration=1.0,
@@ -169,32 +162,32 @@ class Resolved:
         return pytest.approx(table.stress_projector[row] @ given + loads, abs=1e-12)
 
 
-def test_a_traction_is_put_in_place_whatever_the_stress_was(traction):
+def test_a_traction_is_put_in_place_whatever_the_stress_was():
     """All else is kept."""
-    plate = Resolved(traction(edge("top"), traction=(3.0, 5.0)))
+    plate = Resolved(Traction(edge("top"), traction=(3.0, 5.0)))
     assert plate.stress(0.5, 0.5, given=(1.0, 2.0, 4.0, 8.0)) == [1.0, 5.0, 3.0, 8.0]
 
 
-def test_velocities_beat_tractions(traction):
+def test_velocities_beat_tractions():
     """At a roller's end only the direction along the wall is loaded, at a fixed end none is."""
-    load = traction(edge("right"), traction=(3.0, 5.0))
+    load = Traction(edge("right"), traction=(3.0, 5.0))
     plate = Resolved(load, Roller(edge("bottom")), Fixed(edge("top")))
     assert plate.stress(1.0, 0.0, given=(1.0, 2.0, 4.0, 8.0)) == [3.0, 2.0, 0.0, 8.0]
     assert plate.stress(1.0, 0.25, given=(1.0, 2.0, 4.0, 8.0)) == [3.0, 2.0, 5.0, 8.0]
     assert plate.stress(1.0, 0.5, given=(1.0, 2.0, 4.0, 8.0)) == [1.0, 2.0, 4.0, 8.0]
 
 
-def test_where_a_load_ends_its_last_node_has_the_mean(traction):
+def test_where_a_load_ends_its_last_node_has_the_mean():
     """The trapezoidal rule then gives the force of the load, 6 Pa on half a metre. So with shears at a corner."""
-    load = traction(edge("top") & where(lambda x, y: x <= 0.5), traction=(0.0, -6.0))
+    load = Traction(edge("top") & where(lambda x, y: x <= 0.5), traction=(0.0, -6.0))
     plate = Resolved(load, Free(edge("top") & where(lambda x, y: x >= 0.5)))
     for x, pressure in ((0.0, -6.0), (0.25, -6.0), (0.5, -3.0), (0.75, 0.0)):
         assert plate.stress(x, 0.5) == [0.0, pressure, 0.0, 0.0]
-    sheared = Resolved(traction(edge("right"), traction=(2.0, 4.0)), Free(edge("top")))
+    sheared = Resolved(Traction(edge("right"), traction=(2.0, 4.0)), Free(edge("top")))
     assert sheared.stress(1.0, 0.5) == [2.0, 0.0, 2.0, 0.0]
 
 
-def test_corners_that_look_alike_have_the_loads_of_their_own_faces(traction):
+def test_corners_that_look_alike_have_the_loads_of_their_own_faces():
     """A step with two corners: the upper one is loaded on both of its faces, the lower one on top only."""
     step = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], 1.0).mesh()
     number = {tuple(point): k for k, point in enumerate(step.nodes.tolist())}
@@ -204,18 +197,18 @@ def test_corners_that_look_alike_have_the_loads_of_their_own_faces(traction):
         "free": [(lower, number[2.0, 0.0])],
     }
     body = GivenMesh(points=step.nodes, cells=step.cells[:, list(step.kind.drawn)], tags=tags)
-    resolved = Resolved(traction(tag("loaded"), traction=(2.0, 0.0)), Free(tag("free")), shape=body)
+    resolved = Resolved(Traction(tag("loaded"), traction=(2.0, 0.0)), Free(tag("free")), shape=body)
     assert resolved.stress(1.0, 2.0) == [2.0, 0.0, 1.0, 0.0]
     assert resolved.stress(2.0, 1.0) == [0.0, 0.0, 1.0, 0.0]
 
 
-def test_a_load_of_zero_is_none(traction):
-    table = Resolved(traction(edge("top"), traction=(1.0, 2.0), factor=0.0)).table
+def test_a_load_of_zero_is_none():
+    table = Resolved(Traction(edge("top"), traction=(1.0, 2.0), factor=0.0)).table
     assert not table.loaded and table.functions == ()
 
 
-def test_loads_and_motions_share_their_functions_and_wild_ones_stay_at_their_nodes(traction):
-    wild = traction(edge("right"), traction=(1.0, 0.0), factor=math.sin)
+def test_loads_and_motions_share_their_functions_and_wild_ones_stay_at_their_nodes():
+    wild = Traction(edge("right"), traction=(1.0, 0.0), factor=math.sin)
     table = Resolved(wild, PrescribedVelocity(edge("left"), (math.sin, 1.0))).table
     named = [getattr(function, "function", function) for function in table.functions]
     assert named == [math.sin, math.sin, 1.0, 0.0], "once of the motion, checked at every time, once of the load"
@@ -223,15 +216,15 @@ def test_loads_and_motions_share_their_functions_and_wild_ones_stay_at_their_nod
     assert (table.traction_function[others] == 3).all() and not table.traction[others].any()
 
 
-def test_a_face_is_loaded_once(traction):
-    load = traction(edge("top"), traction=(0.0, -1.0))
+def test_a_face_is_loaded_once():
+    load = Traction(edge("top"), traction=(0.0, -1.0))
     for other in (load, Free(edge("top"))):
         with pytest.raises(SceneError, match=r"^conditions.*shares 4 boundary face.*loaded has one condition$"):
             Resolved(other, load)
     with pytest.raises(SceneError, match=r"either free or moved"):
         Resolved(load, Roller(edge("top")))
     with pytest.raises(SceneError, match=r"^Traction.traction = \(1.0,\) .* 2 components$"):
-        Resolved(traction(edge("top"), traction=(1.0,)))
+        Resolved(Traction(edge("top"), traction=(1.0,)))
 
 
 def test_free_conditions_that_meet_on_a_smooth_edge_have_one_normal():
@@ -243,9 +236,9 @@ def test_free_conditions_that_meet_on_a_smooth_edge_have_one_normal():
     assert np.allclose(whole.stress_projector, named.stress_projector, atol=1e-11)
 
 
-def test_scenes_with_other_loads_have_other_fingerprints(traction):
+def test_scenes_with_other_loads_have_other_fingerprints():
     def scene(**load):
-        load = traction(edge("right"), **load)
+        load = Traction(edge("right"), **load)
         return Scene(shape=PLATE, material=SOIL, conditions=[Fixed(edge("left")), load], duration=1.0)
 
     loads = [{"traction": (1.0, 0.0)}, {"traction": (0.0, 1.0)}, {"traction": (1.0, 0.0), "factor": pull}]

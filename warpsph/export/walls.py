@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.mesh import NO_SIDE, Mesh
-from ..scene.condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotating
+from ..scene.condition import Condition, Fixed, PrescribedVelocity, Roller, Rotating
 from ..scene.scene import Scene
 
 KINDS = {Fixed: "fixed", Roller: "roller", PrescribedVelocity: "moving", Rotating: "rotating"}
@@ -36,8 +36,8 @@ def walls_of(scene: Scene) -> tuple[Wall, ...]:
     """One wall for every condition that holds or moves at least one whole boundary face."""
     mesh, walls = scene.mesh, []
     for condition in scene.conditions:
-        faces = np.flatnonzero(condition.on.faces(mesh) & condition.on.nodes(mesh)[mesh.faces].all(axis=1))
-        if len(faces) and not isinstance(condition, Free):
+        faces = np.flatnonzero(condition.faces(mesh))
+        if len(faces) and not condition.unmoved:
             name = _unused(_name(condition, mesh, faces), [wall.name for wall in walls])
             walls.append(Wall(name, faces, isinstance(condition, Fixed)))
     return tuple(walls)

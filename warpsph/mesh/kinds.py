@@ -96,6 +96,25 @@ class CellKind:
         places = tuple(itertools.product(line, repeat=self.dim))
         return tuple((1.0 / len(places), self.slopes(place)) for place in places)
 
+    def shares(self, place: Sequence[float]) -> np.ndarray:
+        """N_k at a place ξ of the reference cell, shape (c,): f = Σ_k N_k f_k, and Σ_k N_k = 1."""
+        if not self.grid:
+            return np.array([1.0 - sum(place), *place])
+        points = np.array(self.points)
+        return np.where(points == 1.0, place, 1.0 - np.asarray(place)).prod(axis=1)
+
+    @cached_property
+    def product_rule(self) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
+        """Weights, N_k and ∂N_k/∂ξ_a, shapes (c,) and (c, d), at points that integrate N_i N_j dA exactly."""
+        if self.grid:
+            line = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
+            places = list(itertools.product(line, repeat=self.dim))
+        else:
+            near = (1.0 - (self.dim + 2.0) ** -0.5) / (self.dim + 1.0)  # exact for squares
+            corners = np.array(self.points)
+            places = (near + (1.0 - (self.dim + 1.0) * near) * corners).tolist()
+        return tuple((self.volume / len(places), self.shares(place), self.slopes(place)) for place in places)
+
     @cached_property
     def mirrored(self) -> Corners:
         """The corners of the same cell counted the other way round, which turns the sign of its Jacobian."""

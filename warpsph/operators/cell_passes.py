@@ -31,7 +31,6 @@ CALMING = 0.9  # a step: how fast a node that has flowed is taken for an elastic
 # corner folds: with viscosity alone against it, flow bends a cell further and further until it does.
 FLOWING_SHARE, BENT = 2.0 / 3.0, 0.5
 MOST_STRAIN = 0.02  # between two looks at the time step
-LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
 def corner_share(sharpening: float) -> float:
@@ -404,8 +403,11 @@ def push_kernel(space: Space, kind: CellKind, slots: bool):
         book[CONDITIONS] += wp.float64(mass * wp.dot(v - free, v_half))
         nodes.books[i] = book
         row = held.row[i]
-        if row >= 0 and h > real(0.0):
-            reactions[row] = (mass / h) * (v - free)
+        if row >= 0:
+            if h > real(0.0):
+                reactions[row] = (mass / h) * (v - free)
+            else:  # before the first step: what holds the node back
+                reactions[row] = mass * (held.projector[row] * a - a)
         nodes.acceleration[i] = a
         phi = space.phi.with_velocity(nodes.point[i].phi, v)
         nodes.point[i].phi = phi

@@ -6,9 +6,10 @@ from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotat
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .given_mesh import GivenMesh
+from .load import Load, Pressure, Traction
 from .material import Material
 from .numerics import PUBLISHED, SOURCE_SCHEMES, Numerics
-from .output import EdgeForce, NodeValue, Output, Probe
+from .output import EdgeForce, NodeValue, Output, Probe, Reaction
 from .parameter import Parameter
 from .registry import KERNELS, MATERIALS, register
 from .resolve import BoundaryTable
@@ -41,6 +42,7 @@ __all__ = [
     "FreeSurface",
     "GivenMesh",
     "Linear",
+    "Load",
     "Mapped",
     "Material",
     "NodeValue",
@@ -49,9 +51,11 @@ __all__ = [
     "Parameter",
     "Polygon",
     "PrescribedVelocity",
+    "Pressure",
     "Probe",
     "Pulse",
     "Ramp",
+    "Reaction",
     "Roller",
     "Rotating",
     "Scene",
@@ -59,6 +63,7 @@ __all__ = [
     "Shape",
     "SmoothingKernel",
     "Table",
+    "Traction",
     "edge",
     "everywhere",
     "region",

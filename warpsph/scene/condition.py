@@ -4,7 +4,7 @@ Every condition prescribes, direction by direction, either the velocity (`rows`)
 unless it says so). A `Free` edge prescribes all tractions; `Fixed` all velocities (zero); a `Roller` the normal
 velocity and the tangential tractions (both zero); `PrescribedVelocity` the velocity components it is given, and
 zero traction along the others. What happens where conditions meet is in `warpsph.scene.resolve`, how to add one in
-docs/conditions.md.
+docs/conditions.md. Loads are in `warpsph.scene.load`.
 """
 
 from __future__ import annotations
@@ -41,9 +41,23 @@ class Condition:
         """Whether the condition has no meaning without an outward normal."""
         return False
 
+    @property
+    def unmoved(self) -> bool:
+        """Whether it prescribes tractions only, and leaves where nodes go to others."""
+        return False
+
+    @property
+    def rigid(self) -> bool:
+        """Whether its nodes move as one rigid body does."""
+        return False
+
     def nodes(self, mesh: Mesh) -> np.ndarray:
         """Which nodes the condition holds at, boolean, shape (n,)."""
         return self.on.nodes(mesh)
+
+    def faces(self, mesh: Mesh) -> np.ndarray:
+        """Which boundary faces it covers, boolean, shape (f,): those selected with all of their nodes."""
+        return self.on.faces(mesh) & self.on.nodes(mesh)[mesh.faces].all(axis=1)
 
     def rows(self, points: np.ndarray, normal: np.ndarray | None) -> list[Row]:
         """Prescribed velocity directions at nodes that share one outward normal.
@@ -74,6 +88,10 @@ class Condition:
 class Fixed(Condition):
     """No motion: v = 0."""
 
+    @property
+    def rigid(self):
+        return True
+
     def rows(self, points, normal):
         return [(_axis(points, axis), []) for axis in range(points.shape[1])]
 
@@ -86,14 +104,14 @@ class EdgeCondition(Condition):
 
     def __post_init__(self):
         super().__post_init__()
-        _store_normal(self)
+        _store_unit(self, "normal")
 
     @property
     def takes_normal(self) -> bool:
         return True
 
     def check(self, dim):
-        _check_normal(self, dim)
+        _check_unit(self, "normal", dim)
 
 
 @dataclass(frozen=True)
@@ -116,23 +134,34 @@ class PrescribedVelocity(Condition):
     Args:
         on: the nodes.
         velocity: one entry an axis [m/s]: a number, a function of time f(t), or None. For example
-            `(None, Linear(-3e-3))` presses a smooth rigid footing downwards.
+            `(None, Linear(-3e-3))` presses a smooth rigid footing downwards. With `along` one number or function.
         normal: the face's normal, for the tractions; that of the boundary faces unless given.
+        along: the only direction in which the velocity is given, any vector but zero: a smooth footing that
+            leans, `PrescribedVelocity(on, Linear(-3e-3), along=(1.0, 2.0))`.
     """
 
-    velocity: tuple[TimeFunction | None, ...] = ()
+    velocity: tuple[TimeFunction | None, ...] | TimeFunction = ()
     normal: tuple[float, ...] | None = None
+    along: tuple[float, ...] | None = None
 
     def __post_init__(self):
         super().__post_init__()
-        allowed = "it must be a sequence of numbers, functions of time or None, one an axis, not all None"
+        _store_unit(self, "normal")
+        _store_unit(self, "along")
+        if self.along is not None:
+            speed = time_function("PrescribedVelocity.velocity", self.velocity)
+            object.__setattr__(self, "velocity", speed)
+            return
+        allowed = (
+            "it must be a sequence of numbers, functions of time or None, one an axis, not all None; "
+            "a single one needs along"
+        )
         try:
             velocity = tuple(self.velocity)
         except TypeError:
             raise SceneError("PrescribedVelocity.velocity", self.velocity, allowed) from None
         if all(value is None for value in velocity):
             raise SceneError("PrescribedVelocity.velocity", velocity, allowed)
-        _store_normal(self)
         object.__setattr__(
             self,
             "velocity",
@@ -142,16 +171,23 @@ class PrescribedVelocity(Condition):
             ),
         )
 
+    @property
+    def rigid(self):
+        return self.along is None and None not in self.velocity
+
     def rows(self, points, normal):
         one = np.ones(len(points))
+        if self.along is not None:
+            return [(np.broadcast_to(self.along, points.shape), [(one, self.velocity)])]
         return [
             (_axis(points, axis), [(one, value)]) for axis, value in enumerate(self.velocity) if value is not None
         ]
 
     def check(self, dim):
-        if len(self.velocity) != dim:
+        if self.along is None and len(self.velocity) != dim:
             raise SceneError("PrescribedVelocity.velocity", self.velocity, f"it needs {dim} components")
-        _check_normal(self, dim)
+        _check_unit(self, "along", dim)
+        _check_unit(self, "normal", dim)
 
 
 @dataclass(frozen=True)
@@ -166,6 +202,10 @@ class Rotating(Condition):
 
     angular_velocity: float = 0.0
     centre: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def rigid(self):
+        return True
 
     def __post_init__(self):
         super().__post_init__()
@@ -200,6 +240,10 @@ class Free(EdgeCondition):
         normal: the edge's normal; that of the boundary faces unless given.
     """
 
+    @property
+    def unmoved(self):
+        return True
+
     def nodes(self, mesh):
         nodes = self.on.nodes(mesh)
         return nodes & ~reentrant_nodes(mesh) if self.normal is None else nodes
@@ -232,18 +276,19 @@ def _axis(points: np.ndarray, axis: int) -> np.ndarray:
     return np.broadcast_to(np.eye(points.shape[1])[axis], points.shape)
 
 
-def _store_normal(condition: EdgeCondition | PrescribedVelocity) -> None:
-    if condition.normal is None:
+def _store_unit(condition: EdgeCondition | PrescribedVelocity, field: str) -> None:
+    """Make the vector in a field, unless that is None, one of length 1."""
+    given, name = getattr(condition, field), f"{type(condition).__name__}.{field}"
+    if given is None:
         return
-    name = f"{type(condition).__name__}.normal"
-    normal = vector(name, condition.normal)
-    length = math.hypot(*normal)
+    parts = vector(name, given)
+    length = math.hypot(*parts)
     if length == 0.0:
-        raise SceneError(name, normal, "it must not be the zero vector")
-    object.__setattr__(condition, "normal", tuple(part / length for part in normal))
+        raise SceneError(name, parts, "it must not be the zero vector")
+    object.__setattr__(condition, field, tuple(part / length for part in parts))
 
 
-def _check_normal(condition: EdgeCondition | PrescribedVelocity, dim: int) -> None:
-    if condition.normal is not None and len(condition.normal) != dim:
-        name = f"{type(condition).__name__}.normal"
-        raise SceneError(name, condition.normal, f"it needs {dim} components")
+def _check_unit(condition: EdgeCondition | PrescribedVelocity, field: str, dim: int) -> None:
+    given = getattr(condition, field)
+    if given is not None and len(given) != dim:
+        raise SceneError(f"{type(condition).__name__}.{field}", given, f"it needs {dim} components")

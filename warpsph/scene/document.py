@@ -20,8 +20,9 @@ from ..validate import FunctionOfTime, choice
 from .condition import Condition, EdgeCondition
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
+from .load import Load
 from .numerics import Numerics
-from .output import EdgeForce, NodeValue, Output, Probe
+from .output import EdgeForce, NodeValue, Output, Probe, Reaction
 from .registry import MATERIALS
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
@@ -204,12 +205,12 @@ def _is_known(kind: type) -> bool:
 
 @cache
 def _parts() -> dict[str, type]:
-    found = [Linear, Ramp, Pulse, Table, NodeValue, EdgeForce, *PLAIN.values()]
+    found = [Linear, Ramp, Pulse, Table, NodeValue, EdgeForce, Reaction, *PLAIN.values()]
     waiting = [Shape, Condition, Selection]
     while waiting:
         kind = waiting.pop()
         waiting += kind.__subclasses__()
         own = kind.__module__.partition(".")[0] == __package__.partition(".")[0]
-        if own and is_dataclass(kind) and kind not in (Condition, EdgeCondition, Mapped, where):
+        if own and is_dataclass(kind) and kind not in (Condition, EdgeCondition, Load, Mapped, where):
             found.append(kind)
     return {kind.__name__: kind for kind in found}

@@ -33,13 +33,16 @@ def fingerprint(scene: Scene) -> str:
 
 
 def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
-    mesh, boundary, output = scene.mesh, scene.boundary, scene.output
+    mesh, output = scene.mesh, scene.output
     times = np.linspace(0.0, scene.duration, SAMPLES).tolist()
     yield from (("nodes", mesh.nodes), ("cells", mesh.cells), ("faces", mesh.faces))
-    for entry in fields(boundary):
-        if entry.name != "functions":
-            yield f"boundary.{entry.name}", getattr(boundary, entry.name)
-    yield "boundary.functions", np.array([_sample(function, times) for function in boundary.functions])
+    yield "rigid_cells", scene.rigid_cells
+    for name in ("boundary", "loads"):
+        table = getattr(scene, name)
+        for entry in fields(table):
+            if entry.name != "functions":
+                yield f"{name}.{entry.name}", getattr(table, entry.name)
+        yield f"{name}.functions", np.array([_sample(function, times) for function in table.functions])
     yield from (("velocity", scene.initial_velocity), ("stress", scene.initial_stress))
     force = scene.body_force
     yield "body_force", None if force is None else np.array([force(t) for t in times])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from ..mesh.mesh import Mesh
 from ..validate import choice, index, instance, listed, number, vector
 from .place import node_at
 from .selection import Selection
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -48,10 +52,10 @@ class Probe:
             raise SceneError("Output.probes", self.name, allowed)
         return float(value)
 
-    def check(self, mesh: Mesh) -> None:
-        """Raise `SceneError` when a function of ours asks for something that the mesh does not have."""
-        if isinstance(self.function, NodeValue | EdgeForce):
-            self.function.check(mesh)
+    def check(self, scene: Scene) -> None:
+        """Raise `SceneError` when a function of ours asks for something that the scene does not have."""
+        if isinstance(self.function, NodeValue | EdgeForce | Reaction):
+            self.function.check(scene)
 
 
 @dataclass(frozen=True)
@@ -73,9 +77,9 @@ class NodeValue:
         object.__setattr__(self, "near", vector("NodeValue.near", self.near))
         index("NodeValue.component", self.component)
 
-    def check(self, mesh: Mesh) -> None:
+    def check(self, scene: Scene) -> None:
         """Raise `SceneError` when the point is not in the body, to within a cell."""
-        node_at("NodeValue.near", self.near, mesh)
+        node_at("NodeValue.near", self.near, scene.mesh)
 
     def __call__(self, simulation) -> float:
         values = component("NodeValue", simulation.field(self.field), self.component)
@@ -92,8 +96,10 @@ def component(owner: str, values: np.ndarray, which: int) -> np.ndarray:
 class EdgeForce:
     """Force that the body exerts on its surroundings through boundary faces: −∫ σ n dA along an axis.
 
-    The trapezoidal rule over the faces whose nodes are all selected, in the current configuration; [N] in 3D,
-    [N/m] in plane strain. A compressed top edge gives a positive force along +y.
+    The trapezoidal rule over what the selected nodes span of each face, in the current configuration: a whole
+    face, or the triangle of three corners of a face that has four; [N] in 3D, [N/m] in plane strain. A compressed
+    top edge gives a positive force along +y. It is made of the nodes' stresses, and so knows no more than they do
+    of what is between the last selected node and the next one; what balances the loads exactly is `Reaction`.
 
     Args:
         on: the nodes.
@@ -107,31 +113,88 @@ class EdgeForce:
         instance("EdgeForce.on", self.on, Selection, "a selection such as edge('top')")
         index("EdgeForce.axis", self.axis)
 
-    def check(self, mesh: Mesh) -> None:
+    def check(self, scene: Scene) -> None:
         """Raise `SceneError` when the mesh has no such axis, or the selection none of its boundary faces."""
-        index("EdgeForce.axis", self.axis, below=mesh.dim)
-        if not self._faces(mesh).any():
+        index("EdgeForce.axis", self.axis, below=scene.mesh.dim)
+        if not any(len(parts) for _, parts in self._parts(scene.mesh)):
             raise SceneError("EdgeForce.on", self.on, "it must hold all nodes of at least one boundary face")
 
-    def _faces(self, mesh: Mesh) -> np.ndarray:
-        return self.on.nodes(mesh)[mesh.faces].all(axis=1) & self.on.faces(mesh)
+    def _parts(self, mesh: Mesh) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Faces, shape (k,), and the nodes of what is selected of them, shape (k, c), for each number c."""
+        inside, allowed = self.on.nodes(mesh)[mesh.faces], self.on.faces(mesh)
+        count, size = inside.sum(axis=1), mesh.faces.shape[1]
+        whole = np.flatnonzero(allowed & (count == size))
+        parts = [(whole, mesh.faces[whole])]
+        if size > mesh.dim:
+            cut = np.flatnonzero(allowed & (count == size - 1))
+            parts.append((cut, mesh.faces[cut][inside[cut]].reshape(-1, size - 1)))
+        return parts
 
     def __call__(self, simulation) -> float:
+        self.check(simulation.scene)
         mesh, continuum = simulation.mesh, simulation.mesh.continuum
-        self.check(mesh)
-        chosen = self._faces(mesh)
-        current = mesh.with_nodes(simulation.field("position"))
-        normals = current.face_normals()[chosen]
-        area = current.face_areas()[chosen]
-        stress = simulation.field("stress")[mesh.faces[chosen]].mean(axis=1)
-        traction = np.zeros(len(normals))
-        for k, (i, j) in enumerate(continuum.pairs):
-            if max(i, j) < continuum.dim:
-                if i == self.axis:
-                    traction += stress[:, k] * normals[:, j]
-                if j == self.axis and i != j:
-                    traction += stress[:, k] * normals[:, i]
-        return float(-(traction * area).sum())
+        current, stress = mesh.with_nodes(simulation.field("position")), simulation.field("stress")
+        areas, normals, force = current.face_areas(), current.face_normals(), 0.0
+        for faces, nodes in self._parts(mesh):
+            part = stress[nodes].mean(axis=1)
+            area = areas[faces] if nodes.shape[1] == mesh.faces.shape[1] else _triangles(current.nodes[nodes])
+            traction = np.zeros(len(faces))
+            for k, (i, j) in enumerate(continuum.pairs):
+                if max(i, j) < continuum.dim:
+                    if i == self.axis:
+                        traction += part[:, k] * normals[faces, j]
+                    if j == self.axis and i != j:
+                        traction += part[:, k] * normals[faces, i]
+            force -= (traction * area).sum()
+        return float(force)
+
+
+def _triangles(points: np.ndarray) -> np.ndarray:
+    """Areas of triangles with corners (k, 3, 3), shape (k,)."""
+    return 0.5 * np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """Force that the body exerts on the conditions that hold or move its nodes, along an axis: what they take up.
+
+    It is exact: at rest the reactions of all conditions, the loads and the weight add up to nothing. As that of
+    `EdgeForce` it is positive along +y on a top that is pressed; a base that carries a body gives minus its
+    weight. [N] in 3D, [N/m] in plane strain. Beside the last node of a rigid footing a part of
+    first order is too much: it moves what is beside it as well.
+
+    Args:
+        on: the nodes; those that no condition moves add nothing.
+        axis: component, counted from 0.
+    """
+
+    on: Selection
+    axis: int
+
+    def __post_init__(self):
+        instance("Reaction.on", self.on, Selection, "a selection such as edge('bottom')")
+        index("Reaction.axis", self.axis)
+
+    def check(self, scene: Scene) -> None:
+        """Raise `SceneError` without such an axis, a node that a condition moves, or forces on nodes at all."""
+        index("Reaction.axis", self.axis, below=scene.mesh.dim)
+        scheme = scene.numerics.scheme
+        if not scheme.nodal_forces:
+            allowed = f"velocity_scheme {scheme.name} has no forces on nodes; take EdgeForce"
+            raise SceneError("Reaction", self, allowed)
+        if not self._rows(scene).any():
+            raise SceneError("Reaction.on", self.on, "it must hold a node that a condition holds or moves")
+
+    def _rows(self, scene: Scene) -> np.ndarray:
+        boundary = scene.boundary
+        return boundary.moved & self.on.nodes(scene.mesh)[boundary.nodes]
+
+    def __call__(self, simulation) -> float:
+        self.check(simulation.scene)
+        reactions = simulation.stepper.reactions.numpy()
+        return float(
+            -reactions[: len(simulation.scene.boundary.nodes)][self._rows(simulation.scene), self.axis].sum()
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,12 +237,12 @@ class Output:
         instance("Output.field", self.field, str, "the name of a field")
         index("Output.component", self.component)
 
-    def check(self, mesh: Mesh, duration: float) -> None:
-        """Raise `SceneError` when it does not fit the mesh or the duration [s]."""
+    def check(self, scene: Scene) -> None:
+        """Raise `SceneError` when it does not fit the scene."""
         if self.interval is not None:
-            number("Output.interval", self.interval, at_most=duration)
+            number("Output.interval", self.interval, at_most=scene.duration)
         for probe in self.probes:
-            probe.check(mesh)
+            probe.check(scene)
 
 
 def _pair(field: str, value: object, allowed: str) -> tuple[object, object]:

@@ -32,7 +32,7 @@ from ..errors import SceneError
 from ..mesh.continuum import Continuum
 from ..mesh.mesh import Mesh
 from ..validate import TimeFunction
-from .condition import Condition, Free
+from .condition import Condition
 
 # Faces of one node whose normals differ by less than this belong to one smooth edge; their mean is its normal.
 SMOOTH_EDGE_ANGLE = np.deg2rad(50.0)
@@ -73,8 +73,14 @@ class BoundaryTable:
         return self.traction.shape[1] > 0
 
 
-def resolve(mesh: Mesh, conditions: Sequence[Condition]) -> BoundaryTable:
-    """Resolve the conditions on a mesh; see the module's text for the rules."""
+def resolve(mesh: Mesh, conditions: Sequence[Condition], *, duration: float = 1.0) -> BoundaryTable:
+    """Resolve the conditions on a mesh; see the module's text for the rules.
+
+    Args:
+        mesh: the mesh.
+        conditions: the conditions.
+        duration: how long the conditions hold [s]: those that meet are compared so long.
+    """
     dim, size, groups = mesh.dim, mesh.continuum.stress_size, _groups(mesh, conditions)
     nodes = np.array(sorted(node for members in groups.values() for node in members), dtype=np.int64)
     row_of = {node: row for row, node in enumerate(nodes.tolist())}
@@ -100,7 +106,7 @@ def resolve(mesh: Mesh, conditions: Sequence[Condition]) -> BoundaryTable:
         directions = np.array([vectors[0] for vectors, _ in rows]).reshape(-1, dim)
         inverse = _clean(np.linalg.pinv(directions, rcond=TOLERANCE))
         projector = _clean(np.eye(dim) - inverse @ directions)
-        _refuse_contradiction(directions, rows, signature, conditions, points)
+        _refuse_contradiction(directions, rows, signature, conditions, points, duration)
         projectors[where] = projector
         moved[where] = len(rows) > 0
         for column, (_, parts) in zip(inverse.T, rows, strict=True):
@@ -175,20 +181,19 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
     alike = (alike * len(distinct) + angle).tolist()  # equal where both normal and angle are
     unmoved = np.zeros(len(mesh.faces), dtype=bool)  # one smooth edge, however many conditions share it
     for condition in conditions:
-        if isinstance(condition, Free) and condition.normal is None:
+        if condition.unmoved and getattr(condition, "normal", None) is None:
             unmoved |= condition.on.faces(mesh)
     signatures: dict[int, list] = defaultdict(list)
-    selected, covered = [], []
+    covered = []
     for index, condition in enumerate(conditions):
         condition.check(mesh.dim)
         nodes, faces = condition.on.nodes(mesh), condition.on.faces(mesh)
         if not nodes.any():
             raise SceneError(f"conditions[{index}]", condition, "its selection must hold at least one node")
-        selected.append(nodes)
-        covered.append(faces & nodes[mesh.faces].all(axis=1))
+        covered.append(condition.faces(mesh))
         given = getattr(condition, "normal", None)
         own = np.repeat(faces, corners)
-        edge = np.repeat(unmoved, corners).tolist() if isinstance(condition, Free) else own.tolist()
+        edge = np.repeat(unmoved, corners).tolist() if condition.unmoved else own.tolist()
         known: dict[tuple, tuple] = {}  # most nodes have faces around them like those of some other node
         for node in np.flatnonzero(condition.nodes(mesh)).tolist():
             around = [place for place in touching.get(node, ()) if edge[place]]
@@ -235,7 +240,7 @@ def _refuse_shared_faces(mesh: Mesh, conditions: Sequence[Condition], covered: l
         first, second, shared = conditions[i], conditions[j], np.flatnonzero(covered[i] & covered[j])
         if not len(shared):
             continue
-        if isinstance(first, Free) and not isinstance(second, Free):
+        if first.unmoved and not second.unmoved:
             reason = "moves or holds them; a face is either free or moved"
         elif first.tractions(mesh.nodes[mesh.faces[shared[0]]], normals[shared[0]]):
             reason = "is on them as well; a face that is loaded has one condition"
@@ -248,8 +253,12 @@ def _refuse_shared_faces(mesh: Mesh, conditions: Sequence[Condition], covered: l
         )
 
 
-def _refuse_contradiction(directions, rows, signature, conditions, points) -> None:
-    """Every linear relation between the directions must hold between their velocities as well."""
+# Functions of time are compared at so many times: equal ones need not be one object, and may add up to nothing.
+COMPARED = 33
+
+
+def _refuse_contradiction(directions, rows, signature, conditions, points, duration) -> None:
+    """Every linear relation between the directions must hold between their velocities as well, at any time."""
     if len(rows) < 2:
         return
     left, values, _ = np.linalg.svd(directions)
@@ -262,9 +271,15 @@ def _refuse_contradiction(directions, rows, signature, conditions, points) -> No
         for coefficient, function in parts:
             if function in functions:
                 targets[row, functions.index(function)] += coefficient
-    violation = np.abs(np.tensordot(left[:, rank:].T, targets, 1)).max(axis=(0, 1), initial=0.0)
+    violation = np.tensordot(left[:, rank:].T, targets, 1)  # of each relation, by function and node
+    if np.abs(violation).max(initial=0.0) <= 1e-9 * (1.0 + np.abs(targets).max()):
+        return
+    over_time = np.array(
+        [[f(t) if callable(f) else f for f in functions] for t in np.linspace(0.0, duration, COMPARED).tolist()]
+    )
+    violation = np.abs(np.einsum("tk,rkn->trn", over_time, violation)).max(axis=(0, 1), initial=0.0)
     worst = int(violation.argmax())
-    if violation[worst] > 1e-9 * (1.0 + np.abs(targets).max()):
+    if violation[worst] > 1e-9 * np.abs(np.einsum("tk,rkn->trn", over_time, targets)).max():
         (first, _), *others = signature
         names = " and ".join(f"conditions[{index}] = {conditions[index]}" for index, _ in others)
         at = tuple(points[worst].tolist())
@@ -287,7 +302,7 @@ def _prescribed_tractions(signature, conditions, projector, points) -> list[Trac
             own = np.array([vectors[0] for vectors, _ in condition.rows(points[:1], normal)])
             own = own.reshape(-1, len(normal))
             free_here = np.eye(len(normal)) - np.linalg.pinv(own, rcond=TOLERANCE) @ own
-            if isinstance(condition, Free):
+            if condition.unmoved:
                 free_here = projector
             directions = []
             for u in _basis(free_here):

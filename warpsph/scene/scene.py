@@ -21,8 +21,10 @@ from ..validate import (
     vector,
 )
 from .code import identity
-from .condition import Condition, Free
+from .condition import Condition
+from .face_loads import FaceLoads, face_loads
 from .free_surface import FreeSurface
+from .load import Load
 from .material import Material
 from .numerics import Numerics
 from .output import Output
@@ -130,7 +132,8 @@ class Scene:
             self._check_free_surface()
         self.numerics.scheme.check_cells(self.mesh)
         self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
-        self.output.check(self.mesh, self.duration)
+        self._check_loads()
+        self.output.check(self)
         check_thickness(self.mesh, self.boundary, self._freed_nodes())
         _ = self.initial_velocity, self.initial_stress, self.initial_internals
 
@@ -148,13 +151,29 @@ class Scene:
             raise SceneError("free_surface", surface, allowed)
         surface.check(self.mesh.dim)
         for index, condition in enumerate(self.conditions):
-            if isinstance(condition, Free):
-                allowed = "with a free_surface every edge that nobody moves is free; leave Free out"
+            if condition.unmoved:
+                name = type(condition).__name__
+                allowed = f"with a free_surface every edge that nobody moves is free; leave {name} out"
                 raise SceneError(f"conditions[{index}]", condition, allowed)
         if not len(surface.candidates(self.mesh, self.conditions)):
             raise SceneError(
                 "free_surface", surface, "a velocity is prescribed on the whole boundary; leave it out"
             )
+
+    def _check_loads(self) -> None:
+        scheme = self.numerics.scheme
+        for index, load in enumerate(self.conditions):
+            if not isinstance(load, Load):
+                continue
+            load.check(self.mesh.dim)
+            load.check_faces(f"conditions[{index}]", self.mesh)
+            if not scheme.nodal_forces and self.large_displacements and (load.turns or not load.follows):
+                allowed = (
+                    f"velocity_scheme {scheme.name} has loads on present areas in directions that stay; take "
+                    "Traction, velocity_scheme cells or large_displacements=False"
+                )
+                raise SceneError(f"conditions[{index}]", load, allowed)
+        _ = self.loads
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -163,8 +182,25 @@ class Scene:
 
     @cached_property
     def boundary(self) -> BoundaryTable:
-        """The conditions, resolved node by node."""
-        return resolve(self.mesh, self.conditions)
+        """The conditions, resolved node by node, without the `loads`."""
+        conditions = self.conditions
+        if self.numerics.scheme.nodal_forces:
+            conditions = tuple(condition for condition in conditions if not isinstance(condition, Load))
+        return resolve(self.mesh, conditions, duration=self.duration)
+
+    @cached_property
+    def rigid_cells(self) -> np.ndarray:
+        """Cells that no motion strains, since one condition moves all of their corners rigidly; boolean (m,)."""
+        rigid = np.zeros(len(self.mesh.cells), dtype=bool)
+        for condition in self.conditions:
+            if condition.rigid:
+                rigid |= condition.nodes(self.mesh)[self.mesh.cells].all(axis=1)
+        return rigid
+
+    @cached_property
+    def loads(self) -> FaceLoads:
+        """The loads that are forces on nodes: all of them, or none where the scheme has stresses take them."""
+        return face_loads(self.mesh, self.conditions if self.numerics.scheme.nodal_forces else ())
 
     @cached_property
     def initial_velocity(self) -> np.ndarray:

@@ -68,6 +68,12 @@ class Scheme:
     courant_limit: float | None = None
     sums: Sums | None = None
 
+    @property
+    def nodal_forces(self) -> bool:
+        """Whether loads are forces on nodes, and what a condition takes up is one; sums over neighbours have none:
+        stresses of edge nodes are given the tractions, see `Condition.tractions`."""
+        return self.sums is None
+
     def check_cells(self, mesh: Mesh) -> None:
         """Refuse cells of a kind that the scheme's sums do not know.
 

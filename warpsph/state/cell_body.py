@@ -14,6 +14,7 @@ from .cells import NodeCells, cell_table, has_slots, node_cells
 
 # Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
 FORCES, CONDITIONS, FLOW = 0, 1, 2
+LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
 @cache
@@ -60,12 +61,15 @@ class CellBody(Body):
         cell_mass: mass of each cell [kg], constant, shape (m,).
         slots: whether `node_cells` has them.
         node_cells: the cells around each node.
+        straining: those that a node's volume and strain rate are of: `node_cells` without cells that conditions
+            move rigidly, so that a clamp inside a body is as stiff as one at its edge.
     """
 
     corners: wp.array
     cell_mass: wp.array
     slots: bool
     node_cells: NodeCells
+    straining: NodeCells
 
     @staticmethod
     def of(scene: Scene, space: Space, launcher: Launcher, *, sharp: bool) -> "CellBody":
@@ -94,12 +98,14 @@ class CellBody(Body):
         shared, slots = shared_parts(scene, space, launcher), has_slots(mesh)
         nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
         nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)
+        table, rigid = node_cells(mesh, slots, device), scene.rigid_cells
         return CellBody(
             nodes=nodes,
             corners=cell_table(mesh, mesh.kind, device),
             cell_mass=wp.array(scene.material.density * mesh.cell_volumes(), dtype=space.real, device=device),
             slots=slots,
-            node_cells=node_cells(mesh, slots, device),
+            node_cells=table,
+            straining=node_cells(mesh, slots, device, without=rigid) if rigid.any() else table,
             **shared,
         )
 

@@ -40,13 +40,22 @@ def has_slots(mesh: Mesh) -> bool:
     return bool(np.bincount((mesh.cells * corners + np.arange(corners)).ravel()).max() == 1)
 
 
-def node_cells(mesh: Mesh, slots: bool, device: wp.Device) -> NodeCells:
+def node_cells(mesh: Mesh, slots: bool, device: wp.Device, without: np.ndarray | None = None) -> NodeCells:
     """The cells around each node, in the order of the corners it is of them.
+
+    Args:
+        mesh: the mesh.
+        slots: whether each corner has one.
+        device: where the table is for.
+        without: cells to leave out, boolean, shape (m,).
 
     In slots they are found without a look at where a row begins, and loops over them are unrolled, with the corner
     known to the compiler: 3 % of a step in the plane.
     """
     (first, place), corners = mesh.cells_of_nodes(), mesh.kind.corners
+    if without is not None:
+        kept = ~without[place // corners]
+        first, place = np.append(0, np.cumsum(kept))[first], place[kept]
     if slots:
         rows = corners * np.arange(len(mesh.nodes) + 1)
         cells = np.full(rows[-1], -1)

@@ -7,12 +7,10 @@ import warp as wp
 
 from ..device.compiling import load_kernels
 from ..device.launching import Launcher
-from ..errors import SceneError
 from ..mesh.kinds import KINDS
 from ..mesh.mesh import Mesh
 from ..operators.cell_limit import CellLimit
 from ..operators.cell_passes import (
-    LEAST_VOLUME,
     corner_share,
     force_kernel,
     kick_kernel,
@@ -23,12 +21,13 @@ from ..operators.cell_passes import (
     stress_kernel,
 )
 from ..operators.cell_shape import cell_shape
+from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
 from ..operators.sharpening import rate_mean_kernel, sharp_types, sharpen_kernel, stress_mean_kernel
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
-from ..state.cell_body import CellBody
+from ..state.cell_body import LEAST_VOLUME, CellBody
 from ..state.clock import Clock
 from .step import Stepper
 
@@ -45,6 +44,7 @@ class CellStepper(Stepper):
         body: nodes, cells and material.
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
+        loads: forces on boundary faces, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
 
     Raises:
@@ -52,9 +52,8 @@ class CellStepper(Stepper):
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
-        if scene.boundary.loaded:
-            raise SceneError("conditions", scene.conditions, "velocity_scheme cells takes no tractions")
-        clock = Clock(scene.body_force, scene.boundary.functions, space, launcher)
+        driven = scene.boundary.functions
+        clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
         c = self._sharpening = scene.numerics.sharpening
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
@@ -66,6 +65,7 @@ class CellStepper(Stepper):
         self._forces = wp.zeros((cells, body.kind.corners), dtype=space.types.vector, device=device)
         self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
+        self.loads = LoadedFaces(body, clock, len(driven))
         self._limit = CellLimit(body, clock)
         kind, slots, share = body.kind, body.slots, corner_share(c)
         self._means = sharp_types(space)()
@@ -85,7 +85,7 @@ class CellStepper(Stepper):
         if c > 0.0:
             kernels += [self._rate_mean, self._stress_mean, self._sharpen]
         super().__init__(launcher, clock, parts=(self._limit,))
-        load_kernels([*kernels, *clock.kernels, *self._limit.kernels], device)
+        load_kernels([*kernels, *clock.kernels, *self.loads.kernels, *self._limit.kernels], device)
         self._limit.refresh()
         self.clock.begin([0.0], 0.0)
         if c > 0.0 and scene.initial_stress.any():
@@ -115,7 +115,7 @@ class CellStepper(Stepper):
         body, clock, launch = self.body, self.clock, self.body.launcher.launch
         nodes, points, dt, faults = body.nodes, body.nodes.point, clock.time_step, clock.faults
         self._rates()
-        inputs = [body.parameters, dt, body.node_cells, self._means, nodes, body.internals]
+        inputs = [body.parameters, dt, body.straining, self._means, nodes, body.internals]
         inputs += [self._limit.outdated, faults]
         launch(self._stress, points, inputs, gathers=self._sharpening > 0.0)
         if self._sharpening > 0.0:
@@ -124,6 +124,7 @@ class CellStepper(Stepper):
         modulus = material.density * material.wave_speed(body.space.dim) ** 2
         inputs = [body.parameters, modulus, dt, body.corners, body.cell_mass, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
+        self.loads.add(self._forces)
         inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         clock.tick()
@@ -136,7 +137,7 @@ class CellStepper(Stepper):
         launch(self._kick, points, inputs, gathers=False)
         launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
-        launch(self._rate, points, [least_volume, body.node_cells, self._numbers, nodes])
+        launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
         if self._sharpening > 0.0:
             launch(self._rate_mean, corners, [self._sharpening, corners, self._numbers, nodes, self._means])
 
@@ -144,7 +145,7 @@ class CellStepper(Stepper):
         """K σ of the nodes."""
         body, launch = self.body, self.body.launcher.launch
         launch(self._stress_mean, body.corners, [body.corners, body.nodes, self._means])
-        launch(self._sharpen, body.nodes.point, [body.node_cells, self._means, body.nodes])
+        launch(self._sharpen, body.nodes.point, [body.straining, self._means, body.nodes])
 
 
 def spacing(mesh: Mesh) -> float:
