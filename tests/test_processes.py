@@ -110,6 +110,16 @@ def test_signal_waits_until_processes_know_what_they_have_to_clean_up(monkeypatc
     assert len(made) > 1, "all of them were made"
 
 
+def test_progress_bar_makes_no_semaphore_of_the_system():
+    """A process of a report that is told to end would leave it behind, and Python's tracker would write so."""
+    code = (
+        "from multiprocessing.synchronize import SemLock\nSemLock.__init__ = None\n"
+        "from warpsph.cli.progress import bar\nbar(False, total=1).close()\nbar(True, total=1).close()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 STREAMS = {
     "no error stream": "2>&-",
     "no output": ">&-",

@@ -12,11 +12,10 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from pathlib import Path
 
-from tqdm import tqdm
-
 from ..errors import DamagedError
 from ..simulation.device import THREADS, all_cores
 from .parent import end_with_parent, for_child
+from .progress import bar
 from .scene_run import SceneRun
 from .stopping import TERMINAL, starting_processes
 
@@ -76,8 +75,8 @@ def make_missing(
         print(f"{len(runs)} runs, {done} of them done already, in {folder}/", flush=True)
     show = not quiet and sys.stderr.isatty()
     form = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
-    with tqdm(total=sum(cost.values()), disable=not show, leave=False, bar_format=form) as bar, workers:
-        failed |= _Queue(missing, cost, folder, device, workers, bar, quiet).make()
+    with bar(show, total=sum(cost.values()), bar_format=form) as shown, workers:
+        failed |= _Queue(missing, cost, folder, device, workers, shown, quiet).make()
     return failed
 
 
