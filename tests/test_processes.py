@@ -110,6 +110,16 @@ def test_signal_waits_until_processes_know_what_they_have_to_clean_up(monkeypatc
     assert len(made) > 1, "all of them were made"
 
 
+def test_processes_that_are_stopped_leave_nothing_to_wait_for():
+    """Those at work end, those that wait do not begin; no thread dies of it."""
+    with processes(2) as executor:
+        futures = [executor.submit(time.sleep, 60.0) for _ in range(20)]
+        begin = time.monotonic()
+        executor.stop()
+        assert all(future.done() for future in futures) and time.monotonic() - begin < 30.0
+    assert sum(future.cancelled() for future in futures) < 20, "some had been handed out"
+
+
 def test_progress_bar_makes_no_semaphore_of_the_system():
     """A process of a report that is told to end would leave it behind, and Python's tracker would write so."""
     code = (

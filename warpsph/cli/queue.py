@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time as clock
 from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
@@ -36,6 +37,18 @@ class Processes(ProcessPoolExecutor):
         """As of every executor; it may start a process."""
         with starting_processes():
             return super().submit(*arguments, **named)
+
+    def stop(self) -> None:
+        """Ask those at work to end, and begin no more.
+
+        What waits is cancelled by the executor's own thread: that of ours could do it just as that one says of the
+        same run that its process has gone, which is an error there.
+        """
+        ending = threading.Thread(target=self.shutdown, kwargs={"cancel_futures": True})
+        ending.start()
+        for process in multiprocessing.active_children():
+            process.terminate()
+        ending.join()
 
 
 def processes(jobs: int) -> Executor:
@@ -118,10 +131,10 @@ class _Queue:
                     self._say(run, error)
                 self._show([run for future, run in pending.items() if future.running()])
         except BaseException:  # an interrupt above all: what is done stays
+            if isinstance(self._workers, Processes):
+                self._workers.stop()
             for future in pending:
                 future.cancel()
-            for process in multiprocessing.active_children():
-                process.terminate()
             raise
 
     def _say(self, run: SceneRun, error: BaseException | None) -> None:
