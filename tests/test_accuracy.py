@@ -222,12 +222,12 @@ def impact(columns, courant, share):
 
 
 @pytest.mark.parametrize(
-    ("columns", "courant", "bound"), [(200, 0.5, 0.035), (200, 0.9, 0.022), (800, 0.5, 0.014), (800, 0.9, 0.009)]
+    ("columns", "courant", "bound"), [(200, 0.5, 0.035), (200, 0.8, 0.022), (800, 0.5, 0.014), (800, 0.8, 0.009)]
 )
 def test_elastic_impact(columns, courant, bound):
     """Exact: at rest between x = ½ ± c t. L1 of v/V within the bound; inside, ringing ≤ 5 % away from the fronts.
 
-    Measured 0.0268, 0.0171, 0.0119, 0.0073, and 4.2 %.
+    Measured 0.0148, 0.0143, 0.0049, 0.0056, and 0.9 %.
     """
     simulation, c = impact(columns, courant, 1e-4)
     distance = np.abs(simulation.mesh.nodes[:, 0] - 0.5)
@@ -238,7 +238,7 @@ def test_elastic_impact(columns, courant, bound):
     assert np.abs(v).max() <= 1.0 + 1e-3
 
 
-@pytest.mark.parametrize(("share", "courant"), [(0.1, 0.5), (0.1, 0.8), (0.1, 0.9), (0.3, 0.8)])
+@pytest.mark.parametrize(("share", "courant"), [(0.1, 0.5), (0.1, 0.8), (0.3, 0.8)])
 def test_strong_impact_obeys_rankine_and_hugoniot(share, courant):
     """Large displacements at 0.1 c and 0.3 c: σ = M ln F behind a shock of Lagrangian speed U, F = 1 − V/U.
 

@@ -88,7 +88,8 @@ def state_of(simulation):
 
 
 def cells_state_of(simulation):
-    return state_of(simulation) | {"a": simulation.nodes.acceleration.numpy().astype(float)}
+    more = {"a": simulation.nodes.acceleration, "flowed": simulation.nodes.flowed}
+    return state_of(simulation) | {name: array.numpy().astype(float) for name, array in more.items()}
 
 
 def model_of(scene):

@@ -15,6 +15,7 @@ ALTERNATING = np.array([1.0, -1.0, -1.0, 1.0])
 ROUND = {3: [0, 1, 2], 4: [0, 2, 3, 1]}  # the corners in the order in which one walks around the cell
 CORNER_SHARE = 2.0 / 3.0
 LEAST_VOLUME = 0.15
+CALMING = 0.9
 MEAN_YIELD_ITERATIONS = 4
 
 
@@ -121,12 +122,17 @@ def volumes(x, model):
     return volume
 
 
-def nodal_gradients(x, v, model):
+def share_of(cell, flowed):
+    """κ of a cell: none where a corner has just flowed."""
+    return CORNER_SHARE * (1.0 - max(flowed[i] for i in cell))
+
+
+def nodal_gradients(x, v, flowed, model):
     """L_i = sum_p w_p G_p v / V_i over the corners p at each node."""
     L = np.zeros((len(x), 2, 2))
     for cell in model["cells"]:
         weight = area_and_slopes(x[cell])[0] / len(cell)
-        g = corner_gradients(x[cell], CORNER_SHARE)
+        g = corner_gradients(x[cell], share_of(cell, flowed))
         for p, i in enumerate(cell):
             for k, j in enumerate(cell):
                 L[i] += weight * np.outer(v[j], g[p, k])
@@ -134,13 +140,13 @@ def nodal_gradients(x, v, model):
     return L / volume[:, None, None]
 
 
-def forces(x, x_half, v_half, sigma, L, dt, model):
+def forces(x, x_half, v_half, sigma, L, flowed, dt, model):
     """f_k = −sum_p w_p (σ_p g_pk(κ) + τ_p g_pk(1)), τ_p = η D_e : (G_p(1) v − L_p) of the half step."""
     f = np.zeros_like(x)
     for cell in model["cells"]:
         n = len(cell)
         (area, slopes), area0 = area_and_slopes(x[cell]), area_and_slopes(model["x0"][cell])[0]
-        smooth, whole = corner_gradients(x[cell], CORNER_SHARE), corner_gradients(x[cell], 1.0)
+        smooth, whole = (corner_gradients(x[cell], share) for share in (share_of(cell, flowed), 1.0))
         before = corner_gradients(x_half[cell], 1.0)
         speed2 = model["wave_speed"] ** 2 * area / area0  # the mass stays, and so does the stiffness
         frequency2 = n * speed2 * np.sum(slopes**2) / area**2
@@ -162,21 +168,24 @@ def forces(x, x_half, v_half, sigma, L, dt, model):
 def slow_cells_step(state: dict, model: dict, t: float, dt: float) -> dict:
     """The state at t + dt from the state at t; the input is not changed."""
     x, v, a = (np.array(state[name], dtype=float) for name in ("x", "v", "a"))
-    sigma, eps = np.array(state["sigma"], dtype=float), np.array(state["eps"], dtype=float)
+    sigma, eps, flowed = (np.array(state[name], dtype=float) for name in ("sigma", "eps", "flowed"))
     h, damped, moves = 0.5 * dt, np.exp(-0.5 * model["damping"] * dt), not model["small_strain"]
 
     v_half = held(damped * (v + h * a), t + h, model)
     x_half = x + h * v_half if moves else x
-    L = nodal_gradients(x_half, v_half, model)
+    L, flows = nodal_gradients(x_half, v_half, flowed, model), CALMING * flowed
     for i in range(len(x)):
         stress, strained_by = full(sigma[i]), dt * elastic(L[i], model)
         if moves:  # L is in the axes of the half step
             stress, strained_by = turned(stress, L[i], dt), turned(strained_by, L[i], h)
-        stress, eps[i] = relax(stress + strained_by, eps[i], dt, model)
+        trial = stress + strained_by
+        stress, eps[i] = relax(trial, eps[i], dt, model)
+        if np.any(stress != trial):
+            flows[i] = 1.0
         sigma[i] = components(stress)
     x = x + dt * v_half if moves else x
-    f = forces(x, x_half, v_half, sigma, L, dt, model)
+    f = forces(x, x_half, v_half, sigma, L, flowed, dt, model)
     a = f / model["mass"][:, None] + np.asarray(model["body_force"](t + dt), dtype=float)
     v = held(damped * v_half + h * a, t + dt, model)
     rho = model["mass"] / volumes(x, model)
-    return {"x": x, "v": v, "a": a, "sigma": sigma, "eps": eps, "rho": rho, "L": L}
+    return {"x": x, "v": v, "a": a, "sigma": sigma, "eps": eps, "flowed": flows, "rho": rho, "L": L}

@@ -12,7 +12,8 @@ from ..storage.files import remove_parts
 from ..storage.owner import marked
 
 SUMMARY, HISTORY, OVERVIEW = "summary.json", "history.csv", "overview.png"
-HISTORY_PICTURE, FIELD_PICTURE, SURFACE_PICTURE = PICTURES = ("history.png", "field.png", "surface.png")
+PICTURES = ("history.png", "energy.png", "field.png", "surface.png")
+HISTORY_PICTURE, ENERGY_PICTURE, FIELD_PICTURE, SURFACE_PICTURE = PICTURES
 SCENE, ARRAYS, COPY = STORED = ("scene.toml", "scene.npz", "scene_file.py")
 RESULTS = (SUMMARY, *PICTURES, OVERVIEW)  # of a run that has ended
 

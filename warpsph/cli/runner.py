@@ -14,6 +14,7 @@ from typing import Protocol
 from .. import __version__
 from ..errors import BreakdownError, FunctionError, SceneError, StoppedError
 from ..export.frame_files import read_about, times_of_frames
+from ..export.pictures.energy import plot_energy
 from ..export.pictures.field import plot_field
 from ..export.pictures.history import plot_history
 from ..export.pictures.surface import plot_surface
@@ -23,6 +24,7 @@ from ..scene.scene import Scene
 from ..simulation.history import History
 from ..simulation.simulation import Observer, Simulation
 from ..simulation.summary import summarise
+from ..state.energy import GIVEN, TAKEN
 from ..storage.files import write_json
 from ..storage.owner import owned, owned_file
 from ..validate import number
@@ -30,6 +32,7 @@ from .catalogue import SceneFile
 from .progress import Progress
 from .restart import Restart
 from .run_folder import (
+    ENERGY_PICTURE,
     FIELD_PICTURE,
     HISTORY,
     HISTORY_PICTURE,
@@ -245,6 +248,8 @@ def _draw(course: Course) -> list[str]:
     simulation, folder, drawn = course.simulation, course.folder, []
     if plot_history(simulation, course.history, folder / HISTORY_PICTURE):
         drawn.append(HISTORY_PICTURE)
+    if plot_energy(simulation, course.history, folder / ENERGY_PICTURE):
+        drawn.append(ENERGY_PICTURE)
     if course.error is None:
         plot_field(simulation, folder / FIELD_PICTURE)
         drawn.append(FIELD_PICTURE)
@@ -260,6 +265,8 @@ def _tell(course: Course, summary: Mapping, pictures: list[str], quiet: bool, sa
         f"{simulation.steps} steps to t = {simulation.time:.6g} s in {course.wall_time:.1f} s, "
         f"{summary['node_steps_per_second']:.3g} node-steps/s"
     )
+    if summary["energy"]:
+        say(_energy_line(summary["energy"]))
     if course.error:
         print(f"warpsph: {course.error}", file=sys.stderr)
     elif not course.finished and course.stop is None:
@@ -269,6 +276,22 @@ def _tell(course: Course, summary: Mapping, pictures: list[str], quiet: bool, sa
     say(f"results in {folder}/: {', '.join([SUMMARY, HISTORY, 'scene.toml', *pictures])}")
     if course.settings.frames:
         say(f"all times on one sheet: warpsph plot {folder}")
+
+
+def _energy_line(energy: Mapping) -> str:
+    """What came in, where it is or went, and what is unaccounted for, without what is less than a thousandth."""
+    values = {name: energy[name] for name in ("initial", *GIVEN, *TAKEN)}
+    if any(value is None for value in values.values()):
+        return "energy: not finite any more"
+    least = 1e-3 * max(abs(value) for value in values.values())
+
+    def told(names):
+        return ", ".join(f"{name} {values[name]:.3g}" for name in names if abs(values[name]) > least) or "nothing"
+
+    return (
+        f"energy [{energy['unit']}]: {told(('initial', *GIVEN))} came in; {told(TAKEN)}; "
+        f"{100.0 * energy['unaccounted_share']:.2g} % unaccounted for"
+    )
 
 
 def table(checks: Sequence[Check]) -> str:

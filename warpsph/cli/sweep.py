@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 
 from ..errors import SceneError
+from ..scene.output import ENERGY_COLUMN
 from ..scene.parameter import assign
 from ..simulation.history import read_history
 from ..simulation.summary import read_summary
@@ -68,7 +69,8 @@ def _outcome(folder: Path) -> dict[str, object]:
         found |= {f"{name} [{check['unit']}]": check["value"]}
         found |= {f"{name} {part}": check.get(part) for part in ("reference", "error", "passed")}
     found |= {name: summary[name] for name in METRICS}
-    return found | {f"last {n} [{units[n]}]": float(columns[n][-1]) for n in [*columns][2:] if len(columns[n])}
+    probes = [n for n in [*columns][2:] if len(columns[n]) and not n.startswith(ENERGY_COLUMN)]
+    return found | {f"last {n} [{units[n]}]": float(columns[n][-1]) for n in probes}
 
 
 def members(scene: str, settings: Sequence[str], precision: str, frames: int = 0) -> list[Member]:

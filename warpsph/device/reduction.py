@@ -1,4 +1,4 @@
-"""The largest magnitude in an array, found on the device.
+"""The largest magnitude in an array, and the sum of one, found on the device.
 
 To copy an array from a GPU and look at it on the host takes as long as many steps; here one value comes for every
 `SHARE` of them.
@@ -35,6 +35,34 @@ class LargestMagnitude:
         values = wp.array(ptr=array.ptr, shape=self._n, dtype=self._real, device=array.device)
         self._launcher.launch(self._kernel, self._largest, [values, self._largest])
         return float(self._largest.numpy().max())
+
+
+class Sum:
+    """The sum of float64 arrays of one length, in an order that does not depend on who adds up.
+
+    Args:
+        n: their length.
+        launcher: launches the kernel.
+    """
+
+    def __init__(self, n: int, launcher: Launcher):
+        self._launcher = launcher
+        self._partial = wp.zeros(-(-n // SHARE), dtype=wp.float64, device=launcher.device)
+        self.kernels = (_partial_sums,)
+
+    def of(self, array: wp.array) -> float:
+        """Σ of the values."""
+        self._launcher.launch(_partial_sums, self._partial, [array, self._partial])
+        return float(self._partial.numpy().sum())
+
+
+@forward_kernel
+def _partial_sums(first: int, values: wp.array(dtype=wp.float64), result: wp.array(dtype=wp.float64)):
+    k = first + wp.tid()
+    total = wp.float64(0.0)
+    for n in range(SHARE * k, wp.min(SHARE * (k + 1), values.shape[0])):
+        total += values[n]
+    result[k] = total
 
 
 @cache

@@ -17,6 +17,7 @@ from .selection import Selection
 
 if TYPE_CHECKING:
     from .scene import Scene
+ENERGY_COLUMN = "energy."  # how names of a history's energies begin
 
 
 @dataclass(frozen=True)
@@ -222,8 +223,9 @@ class Output:
         names = ["step", "time"]
         object.__setattr__(self, "probes", listed("Output.probes", self.probes, Probe, "a sequence of Probe"))
         for probe in self.probes:
-            if probe.name in names:
-                raise SceneError("Output.probes", probe.name, f"names must differ, and from {names[:2]}")
+            if probe.name in names or probe.name.startswith(ENERGY_COLUMN):
+                allowed = f"names must differ, and from {names[:2]} and those of energies, {ENERGY_COLUMN}…"
+                raise SceneError("Output.probes", probe.name, allowed)
             names.append(probe.name)
         if self.interval is not None:
             number("Output.interval", self.interval, at_least=0.0)

@@ -70,8 +70,10 @@ class Scheme:
 
     @property
     def nodal_forces(self) -> bool:
-        """Whether loads are forces on nodes, and what a condition takes up is one; sums over neighbours have none:
-        stresses of edge nodes are given the tractions, see `Condition.tractions`."""
+        """Whether loads are forces on nodes, and what a condition takes up is one.
+
+        Sums over neighbours have none: stresses of edge nodes are given tractions (`Condition.tractions`).
+        """
         return self.sums is None
 
     def check_cells(self, mesh: Mesh) -> None:

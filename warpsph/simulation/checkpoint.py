@@ -18,7 +18,7 @@ from ..errors import SceneError
 from ..scene.fingerprint import fingerprint
 from ..storage.files import write_whole
 from ..storage.reading import check_array, digest, read_arrays, reading, require
-from .history import History
+from .history import History, columns_of
 from .simulation import COUNTERS, Simulation
 from .time_step import Stretch
 
@@ -106,7 +106,7 @@ class Checkpoint:
                 allowed = f"it was recorded with another function of the probe {name!r}{why}; start again"
                 raise SceneError("checkpoint", str(self.path), allowed)
         with reading("checkpoint", self.path, "it holds another state ({error})"):
-            columns = 2 + len(simulation.scene.output.probes)
+            columns = len(columns_of(simulation))
             require(not self.history or self.history["rows"].shape[1] == columns, "other columns of the history")
             simulation.restore(self.arrays, self.header["values"])
 

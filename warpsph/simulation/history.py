@@ -1,4 +1,4 @@
-"""The history of a run: the scene's probes sampled in time, written as the run goes on."""
+"""The history of a run: the scene's probes and its energies sampled in time, written as the run goes on."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ..scene.output import ENERGY_COLUMN
+from ..state.energy import COLUMNS, UNITS
 from ..storage.files import whole
 from ..storage.reading import reading, require
 from .simulation import Simulation
 
 
 class History:
-    """Samples the probes of a scene at its output interval.
+    """Samples the probes of a scene, and its energy balance where there is one, at its output interval.
 
     Args:
         simulation: the simulation; sampled at once, then whenever an interval has passed.
@@ -30,7 +32,7 @@ class History:
         state: what `state` gave, to go on from there; `simulation` is then not sampled at once.
 
     Attributes:
-        names: column names, `step` and `time` first.
+        names: column names, `step` and `time` first, then the probes', then `energy.kinetic` and the others.
         next_time: when the next sample is due [s].
         units: their units.
 
@@ -53,8 +55,8 @@ class History:
         output, duration = simulation.scene.output, simulation.scene.duration
         self._probes = output.probes
         self._interval = duration / 400.0 if output.interval is None else output.interval
-        self.names = ["step", "time", *(probe.name for probe in self._probes)]
-        self.units = ["-", "s", *(probe.unit for probe in self._probes)]
+        columns = columns_of(simulation)
+        self.names, self.units = list(columns), list(columns.values())
         self._values = array("d")  # row after row, in few bytes: a run may have millions
         self.next_time = -math.inf  # of the simulation [s], when to sample next
         if state is not None:
@@ -81,6 +83,8 @@ class History:
         if self._values and self._values[-len(self.names)] == simulation.steps:
             return
         row = [simulation.steps, simulation.time, *(probe.sample(simulation) for probe in self._probes)]
+        balance = simulation.energy()
+        row += [] if balance is None else balance.columns().values()
         self._values.extend(row)
         written = _encoded([_texts(row)])
         self._hash.update(written)
@@ -112,6 +116,14 @@ class History:
         """Close the file."""
         if self._file:
             self._file.close()
+
+
+def columns_of(simulation: Simulation) -> dict[str, str]:
+    """The columns of a simulation's history, name → unit."""
+    probes = {probe.name: probe.unit for probe in simulation.scene.output.probes}
+    unit = UNITS[simulation.mesh.dim]
+    energies = {} if simulation.energy() is None else {ENERGY_COLUMN + name: unit for name in COLUMNS}
+    return {"step": "-", "time": "s"} | probes | energies
 
 
 def _texts(row: list[float]) -> list:

@@ -18,16 +18,18 @@ from ..physics.space import Space
 from ..scene.place import node_at
 from ..scene.scene import Scene
 from ..state.clock import LONGEST_RUN
+from ..state.energy import Energy
 from ..step import scheme  # noqa: F401 — makes the schemes known
 from ..validate import instance, number
-from .breakdown import FLATTENED, LEAST_STEP_SHARE, breakdown
+from .breakdown import FLATTENED, LEAST_STEP_SHARE, MOST_UNACCOUNTED, UNACCOUNTED, breakdown
 from .device import choose_device, choose_threads
 from .fields import fields_of
 from .interrupts import held_back
 from .state import arrays, numbers, restore
 from .time_step import Stretch, TimeStep
 
-COUNTERS = ("time", "steps", "wall_time", "shortest_step", "longest_step")
+COUNTERS = ("time", "steps", "wall_time", "shortest_step", "longest_step", "largest_energy")
+WATCH = 128  # steps between two looks at the energy balance, which takes a tenth of a step
 # Node-steps that the device makes on its own: about 0.1 s on a CPU core, 1 s on a GPU. Signals wait as long.
 AHEAD_ON_CPU, AHEAD_ON_GPU = 200_000, 1_000_000_000
 
@@ -60,6 +62,7 @@ class Simulation:
         steps: number of steps made.
         shortest_step, longest_step: smallest and largest Δt used so far [s].
         wall_time: seconds spent in steps, without the start.
+        largest_energy: largest entry that the energy balance has had, as seen every `WATCH` steps.
         threads: number of CPU threads.
         nodes, internals: the arrays on the device.
         conditions: the boundary conditions on the device, among them the free surface.
@@ -90,6 +93,7 @@ class Simulation:
         self.conditions = self.stepper.conditions
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
+        self.largest_energy = 0.0
 
     @property
     def time_step_limit(self) -> float:
@@ -141,7 +145,8 @@ class Simulation:
         """Where the next steps begin [s], up to the one after which an observer looks."""
         due = min((getattr(observer, "next_time", -math.inf) for observer in observers), default=math.inf)
         ahead = AHEAD_ON_CPU if self.device.is_cpu else AHEAD_ON_GPU
-        most = max(1, min(LONGEST_RUN, ahead // len(self.mesh.nodes), stretch.last - self.steps))
+        most = min(LONGEST_RUN, ahead // len(self.mesh.nodes), stretch.last - self.steps)
+        most = max(1, min(most, WATCH - self.steps % WATCH))
         times = [stretch.time_after(self.steps + k) for k in range(most + 1)]
         return times[: next((k for k in range(1, most) if times[k] >= due), most)]
 
@@ -154,9 +159,23 @@ class Simulation:
         self.shortest_step = min(self.shortest_step, dt)
         self.longest_step = max(self.longest_step, dt)
         self.wall_time += clock.perf_counter() - begin
-        fault = outcome.fault or (FLATTENED if self.stepper.shrinkage < LEAST_STEP_SHARE else None)
+        flattened = FLATTENED if self.stepper.shrinkage < LEAST_STEP_SHARE else None
+        fault = outcome.fault or flattened or self._watch_energy()
         if fault is not None:
             raise breakdown(self, fault, dt)
+
+    def _watch_energy(self) -> str | None:
+        """At some steps, whoever observes: whether energy has come from nowhere, or gone."""
+        balance = self.stepper.energy() if self.steps % WATCH == 0 else None
+        if balance is None:
+            return None
+        self.largest_energy = max(self.largest_energy, balance.largest)
+        return UNACCOUNTED if abs(balance.amiss) > MOST_UNACCOUNTED * self.largest_energy else None
+
+    @exclusive
+    def energy(self) -> Energy | None:
+        """The energy balance since the start; None with schemes that keep no books."""
+        return self.stepper.energy()
 
     @exclusive
     def state(self) -> tuple[dict[str, np.ndarray], dict[str, object]]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import warp as wp
 
 from ..scene.check import Check
+from ..state.energy import UNITS
 from ..storage.reading import checked, read_json
 from .simulation import Simulation
 
@@ -56,11 +59,26 @@ def summarise(
         "wall_time": wall_time,
         "node_steps_per_second": rate,
         "neighbour_list_builds": simulation.list_builds,
+        "energy": _energy(simulation),
         "stopped": stopped,
         "error": error,
         "history": history,
         "checks": [check.as_dict() for check in checks],
     }
+
+
+def _energy(simulation: Simulation) -> dict[str, object] | None:
+    """The energy balance at the end, its unit, and what is unaccounted for as a share of the largest energy."""
+    balance = simulation.energy()
+    if balance is None:
+        return None
+    largest = max(simulation.largest_energy, balance.largest) or 1.0
+    numbers = asdict(balance) | {
+        "unaccounted": balance.unaccounted,
+        "unaccounted_share": balance.unaccounted / largest,
+    }
+    told = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
+    return {"unit": UNITS[simulation.mesh.dim]} | told
 
 
 def read_summary(path: Path) -> dict:

@@ -12,9 +12,16 @@ from ..scene.scene import Scene
 from .body import Body, shared_parts
 from .cells import NodeCells, cell_table, has_slots, node_cells
 
-# Entries of a node's books, energies [J]: work of forces on the body, work of its conditions, what flow took.
-FORCES, CONDITIONS, FLOW = 0, 1, 2
+# Rows of the nodes' books, energies [J]: work of the body force and of conditions on velocities; what damping,
+# elastic strain and flow took.
+ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW = tuple(range(5))
 LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
+
+
+@wp.func
+def enter(row: int, i: int, energy: wp.float64, books: wp.array2d(dtype=wp.float64)):
+    """Add an energy to a node's books; `+=` would be atomic."""
+    books[row, i] = books[row, i] + energy
 
 
 @cache
@@ -38,7 +45,7 @@ def cell_node_types(space: Space) -> tuple[type, type]:
         velocity_gradient: wp.array(dtype=types.tensor)
         elastic_rate: wp.array(dtype=types.stress)
         acceleration: wp.array(dtype=types.vector)
-        books: wp.array(dtype=wp.vec3d)
+        books: wp.array2d(dtype=wp.float64)
         strained: wp.array(dtype=space.real)
         sharpened: wp.array(dtype=types.stress)
         flowed: wp.array(dtype=space.real)
@@ -54,7 +61,7 @@ class CellBody(Body):
         nodes: `CellNodes`: `point` x [m] (from `mesh.middle`) and φ = (v, σ) at tⁿ; `half` x and v at t^{n+1/2};
             `reference` X and `displacement` u [m]; `mass` [kg], constant; `volume` V [mᵈ] and
             `velocity_gradient` L [1/s] at t^{n+1/2}; `elastic_rate` Dₑ : L [Pa/s]; `acceleration` [m/s²] at tⁿ by
-            all forces but those of the conditions; `books` [J], the entries `FORCES`, `CONDITIONS` and `FLOW`;
+            all forces but those of the conditions; `books` [J], a row each of `ENTRIES`;
             `strained` ∫ |d| dt since the step was last measured; `sharpened` K σ [Pa], where it is asked for;
             `flowed` of a law that flows, 1 in a step in which it does, then less and less.
         corners: node indices of each cell, shape (m, c).
@@ -91,10 +98,10 @@ class CellBody(Body):
             "velocity_gradient": types.tensor,
             "elastic_rate": types.stress,
             "acceleration": types.vector,
-            "books": wp.vec3d,
             "strained": space.real,
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
+        nodes.books = wp.zeros((len(ENTRIES), n), dtype=wp.float64, device=device)
         shared, slots = shared_parts(scene, space, launcher), has_slots(mesh)
         nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
         nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)

@@ -49,7 +49,8 @@ class Clock:
 
     Attributes:
         time_step: Δt [s].
-        first_half, second_half: b at the start, the middle and the end of each half step.
+        forces: b at t, t + Δt/4, …, t + Δt.
+        first_half, second_half: of these, at the start, the middle and the end of each half step.
         drive: values of the functions, those at t + Δt/2 in row `HALF`, those at t + Δt in row `END`.
         faults: an integer each of `FAULTS`, set by kernels.
         going: 1 while steps are to be made.
@@ -68,7 +69,7 @@ class Clock:
         columns = max(1, len(functions))
         self._forces = wp.zeros((LONGEST_RUN, STAGES), dtype=vector, device=device)
         self._drives = wp.zeros((LONGEST_RUN, 2 * columns), dtype=real, device=device)
-        self._force = wp.zeros(STAGES, dtype=vector, device=device)
+        self.forces = wp.zeros(STAGES, dtype=vector, device=device)
         self._drive = wp.zeros(2 * columns, dtype=real, device=device)
         self.drive = self._drive.reshape((2, columns))
         self.time_step = wp.zeros(1, dtype=real, device=device)
@@ -76,7 +77,7 @@ class Clock:
         self._status = wp.zeros(FIRST_FLAG + MOST_FLAGS, dtype=wp.int32, device=device)
         self._flags = 0
         self.going = wp.zeros(1, dtype=wp.int32, device=device)
-        self.first_half, self.second_half = self._force[:3], self._force[2:]
+        self.first_half, self.second_half = self.forces[:3], self.forces[2:]
         self.faults = self._status[FIRST_FAULT:FIRST_FLAG]
         self._tick = _tick_kernel(space)
         self.kernels = (self._tick,)
@@ -94,7 +95,7 @@ class Clock:
             stages = [(t, t + 0.5 * half, t + half, t + half + 0.5 * half, t + half + half) for t in times]
             forces = np.array([[self._body_force(t) for t in row] for row in stages], dtype=float)
             write_values(self._forces[: len(times)], forces)
-            write_values(self._force, forces[0])
+            write_values(self.forces, forces[0])
         if self._functions:
             ends = [(t + half, t + dt) for t in times]
             drives = np.array([[_value(f, t) for t in row for f in self._functions] for row in ends])
@@ -105,7 +106,7 @@ class Clock:
 
     def tick(self) -> None:
         """Close a step: go on to the next, or end."""
-        inputs = [self._forces, self._drives, self._force, self._drive, self._status, self.going]
+        inputs = [self._forces, self._drives, self.forces, self._drive, self._status, self.going]
         self._launcher.launch(self._tick, self.going, inputs)
 
     def outcome(self) -> Outcome:

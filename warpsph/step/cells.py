@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 
@@ -9,26 +11,21 @@ from ..device.compiling import load_kernels
 from ..device.launching import Launcher
 from ..mesh.kinds import KINDS
 from ..mesh.mesh import Mesh
+from ..operators.cell_energy import CellEnergy
 from ..operators.cell_limit import CellLimit
-from ..operators.cell_passes import (
-    corner_share,
-    force_kernel,
-    kick_kernel,
-    numbers_of,
-    push_kernel,
-    rate_kernel,
-    strain_kernel,
-    stress_kernel,
-)
+from ..operators.cell_numbers import numbers_of
+from ..operators.cell_passes import corner_share, force_kernel, strain_kernel
 from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
+from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
 from ..operators.sharpening import rate_mean_kernel, sharp_types, sharpen_kernel, stress_mean_kernel
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
 from ..state.cell_body import LEAST_VOLUME, CellBody
-from ..state.clock import Clock
+from ..state.clock import Clock, Outcome
+from ..state.energy import Energy
 from .step import Stepper
 
 
@@ -46,9 +43,6 @@ class CellStepper(Stepper):
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
-
-    Raises:
-        SceneError: the scene asks for what this scheme has not.
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
@@ -67,6 +61,7 @@ class CellStepper(Stepper):
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self.loads = LoadedFaces(body, clock, len(driven))
         self._limit = CellLimit(body, clock)
+        self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
         kind, slots, share = body.kind, body.slots, corner_share(c)
         self._means = sharp_types(space)()
         self._means.weight = wp.zeros(cells, dtype=real, device=device)
@@ -85,17 +80,31 @@ class CellStepper(Stepper):
         if c > 0.0:
             kernels += [self._rate_mean, self._stress_mean, self._sharpen]
         super().__init__(launcher, clock, parts=(self._limit,))
-        load_kernels([*kernels, *clock.kernels, *self.loads.kernels, *self._limit.kernels], device)
+        kernels += [*clock.kernels, *self.loads.kernels, *self._limit.kernels, *self._energy.kernels]
+        load_kernels(kernels, device)
         self._limit.refresh()
         self.clock.begin([0.0], 0.0)
         if c > 0.0 and scene.initial_stress.any():
             self._unsharpen(scene.initial_stress)
         self.step()  # of no length: what the initial state asks for, and the accelerations it begins with
+        self._energy.open()
 
     @property
     def shrinkage(self) -> float:
         """Least time of a wave across a cell over the initial one, at most 1."""
         return self._limit.shrinkage
+
+    def energy(self) -> Energy:
+        """The energy balance since t = 0."""
+        return self._energy.now()
+
+    def advance(self, times: Sequence[float], dt: float) -> Outcome:
+        """Make a step from each of the times to Δt later, the first step of all alone; see `Stepper.advance`."""
+        if self._energy.begun:
+            return super().advance(times, dt)
+        outcome = super().advance(times[:1], dt)
+        self._energy.begin()
+        return outcome
 
     def _unsharpen(self, given: np.ndarray) -> None:
         """Let σ be what, sharpened, is the stress that was given, so that what balanced the loads still does.
@@ -125,7 +134,7 @@ class CellStepper(Stepper):
         inputs = [body.parameters, modulus, dt, body.corners, body.cell_mass, nodes, self._numbers]
         launch(self._force, body.corners, [*inputs, self._forces, self.rough_loss])
         self.loads.add(self._forces)
-        inputs = [self.conditions, clock.second_half, damping, dt, body.node_cells, self._forces]
+        inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         clock.tick()
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from ..device.launching import Launcher, Recording
 from ..state.clock import Clock, Outcome
+from ..state.energy import Energy
 from ..state.part import Part
 
 
@@ -38,6 +39,10 @@ class Stepper(ABC):
     @abstractmethod
     def step(self) -> None:
         """Advance the nodes by the clock's Δt; it ends with the clock's tick."""
+
+    def energy(self) -> Energy | None:
+        """The energy balance since t = 0; None where the scheme keeps no books."""
+        return None
 
     def arrays_recorded(self) -> tuple[int, ...]:
         """Addresses of arrays that may be replaced: the step is then recorded anew."""

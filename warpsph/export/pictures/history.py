@@ -10,9 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...errors import SceneError
+from ...scene.output import ENERGY_COLUMN
 from ...simulation.history import History, read_history
 from ...simulation.simulation import Simulation
 from ..frames import Frames
+from .energy import EnergyCurve
 from .figures import BRIGHT, DARK, axis_label, new_figure, save_picture
 
 CURVES = 3  # at most, on a sheet
@@ -58,13 +60,13 @@ def plot_history(simulation: Simulation, history: History, path: Path) -> bool:
     return True
 
 
-def curves_of(frames: Frames) -> list[HistoryCurve]:
-    """The first curves of the run that the frames are of: the scene's own, then its probes over time."""
+def curves_of(frames: Frames) -> list[HistoryCurve | EnergyCurve]:
+    """The first curves of the run that the frames are of: the scene's own, its probes over time, its energy."""
     path = frames.run / "history.csv"
     if not path.exists():
         return []
     columns, units = read_history(path)
-    probes = [name for name in columns if name not in ("step", "time")]
+    probes = [name for name in columns if name not in ("step", "time") and not name.startswith(ENERGY_COLUMN)]
 
     def column(name: str) -> tuple[str, np.ndarray]:
         return axis_label(name, units[name]), columns[name]
@@ -76,4 +78,6 @@ def curves_of(frames: Frames) -> list[HistoryCurve]:
     pairs = [tuple(first)] if first else []
     pairs += [("time", name) for name in probes if not first or name not in first]
     references = [frames.about["curve_reference"], *[None] * len(pairs)]
-    return [HistoryCurve(column(x), column(y), r) for (x, y), r in zip(pairs, references, strict=False)][:CURVES]
+    curves = [HistoryCurve(column(x), column(y), r) for (x, y), r in zip(pairs, references, strict=False)]
+    energy = EnergyCurve.of(columns, units)
+    return [*curves, *([energy] if energy else [])][:CURVES]
