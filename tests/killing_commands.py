@@ -12,8 +12,6 @@ import time
 import uuid
 from pathlib import Path
 
-from pxr import Sdf
-
 from tests.damaging import SCENE
 from warpsph.cli.main import main
 
@@ -59,9 +57,24 @@ def results(folder):
 
 
 def layer(path):
-    found = Sdf.Layer.OpenAsAnonymous(str(path))
-    assert found is not None, path
-    return found.ExportToString()
+    """A USD stage as text; read by a child, as USD's threads do not survive the forks of this process."""
+    here, there = os.pipe()
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            from pxr import Sdf
+
+            with os.fdopen(there, "w") as file:
+                file.write(Sdf.Layer.OpenAsAnonymous(str(path)).ExportToString())
+            status = 0
+        finally:
+            os._exit(status)
+    os.close(there)
+    with os.fdopen(here) as file:
+        text = file.read()
+    assert os.waitpid(child, 0)[1] == 0, path
+    return text
 
 
 class Kills:

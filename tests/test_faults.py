@@ -98,6 +98,24 @@ def test_file_is_whole_or_not_there(tmp_path):
     assert path.read_bytes() == b"first" and [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
+def test_file_is_on_the_disk_before_it_takes_its_name_and_then_the_name_is(tmp_path, monkeypatch):
+    """Or a machine that loses its power may leave the name with nothing in it."""
+    done, sync, replace = [], os.fsync, os.replace
+
+    def noted_sync(handle):
+        done.append("folder" if stat.S_ISDIR(os.fstat(handle).st_mode) else "content")
+        sync(handle)
+
+    def noted_replace(source, target):
+        done.append("name")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", noted_sync)
+    monkeypatch.setattr(os, "replace", noted_replace)
+    write_whole(tmp_path / "file", lambda file: file.write(b"first"))
+    assert done == ["content", "name", "folder"]
+
+
 def test_checkpoint_that_finds_the_disk_full_leaves_the_last_one_and_the_run(tmp_path, monkeypatch, capsys):
     simulation = Simulation(bar(), device="cpu")
     record = History(simulation)

@@ -1,6 +1,7 @@
 """The frame store: what it keeps, when, and what is left of it after a run dies or goes on."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from warpsph import (
 )
 from warpsph.analysis import green_strain
 from warpsph.cli.main import main
+from warpsph.errors import DamagedError
 from warpsph.export import frames as frames_module
 from warpsph.export.quantity import quantity
 from warpsph.export.walls import WallMesh, walls_of
@@ -249,3 +251,51 @@ def test_history_is_read_up_to_its_last_whole_line(tmp_path):
     columns, units = read_history(tmp_path / "history.csv")
     assert units == {"step": "-", "time": "s", "load at top": "N"}
     np.testing.assert_array_equal(columns["load at top"], [1.5, 2.5])
+
+
+def out_of_range(values):
+    changed = values.copy()
+    changed.flat[1] = 10**6
+    return changed
+
+
+def nan(values):
+    changed = values.copy()
+    changed.flat[0] = np.nan
+    return changed
+
+
+@pytest.fixture(scope="module")
+def framed(tmp_path_factory):
+    """The folder of a run with frames."""
+    folder = tmp_path_factory.mktemp("framed")
+    simulation = Simulation(block(), device="cpu")
+    simulation.run(observers=[FrameWriter(simulation, evenly(4e-3, 2), folder)])
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "change", "message"),
+    [
+        ("000001.npz", "velocity", lambda v: v[:-1], r"velocity has shape \(\d+, 2\)"),
+        ("000001.npz", "density", lambda v: v.astype(np.int32), "density is of type int32"),
+        ("000001.npz", "stress", nan, "stress is not finite everywhere"),
+        ("000001.npz", "time", lambda v: v - 1.0, "its time is below 0"),
+        ("body.npz", "nodes", nan, "nodes is not finite everywhere"),
+        ("body.npz", "cells", out_of_range, "cells leads out of its table"),
+        ("body.npz", "cells", lambda v: v[:, :2].copy(), r"\(2, 2\)"),
+        ("body.npz", "faces", out_of_range, "faces leads out of its table"),
+        ("body.npz", "face_cell", lambda v: v[:-1], r"face_cell has shape \(\d+,\)"),
+        ("body.npz", "wall_0", out_of_range, "wall_0 leads out of its table"),
+    ],
+)
+def test_forged_frame_is_refused(file, name, change, message, framed, tmp_path):
+    """Its checksums fit; only a reader of the meaning sees that it is no frame of this body."""
+    shutil.copytree(framed / "frames", tmp_path / "frames")
+    path = tmp_path / "frames" / file
+    with np.load(path) as archive:
+        content = dict(archive)
+    content[name] = change(content[name])
+    np.savez(path, **content)
+    with pytest.raises(DamagedError, match=message):
+        list(Frames(tmp_path))

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from warpsph import (
@@ -474,11 +474,13 @@ ANYTHING = st.one_of(
     st.floats(-10.0, 10.0),
     st.text(max_size=3),
 )
+KEYS = st.sampled_from(["more", "0", "", "a.b", "type", "values", "code"])
 
 
 @settings(max_examples=400, **{**OPTIONS, "deadline": None})
-@given(st.sampled_from(PLACES), ANYTHING, st.sampled_from(["replace", "remove", "add"]))
-def test_document_with_something_wrong_is_refused_in_one_line_or_runs(place, value, change):
+@example(("duration",), {}, "add", "0")
+@given(st.sampled_from(PLACES), ANYTHING, st.sampled_from(["replace", "remove", "add"]), KEYS)
+def test_document_with_something_wrong_is_refused_in_one_line_or_runs(place, value, change, key):
     """What is accepted is a scene: it is built, compiled and stepped."""
     found = document()
     *way, last = place
@@ -488,7 +490,7 @@ def test_document_with_something_wrong_is_refused_in_one_line_or_runs(place, val
     if change == "remove":
         del part[last]
     elif change == "add" and isinstance(part, dict):
-        part["more"] = value
+        part[key] = value
     else:
         part[last] = value
     begin = time.perf_counter()

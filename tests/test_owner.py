@@ -153,6 +153,23 @@ def test_probe_with_another_function_under_its_name_is_refused():
     assert run("plate.py", "--resume", "out") == (0, "")
 
 
+@pytest.mark.parametrize("damage", ["{", "[]", "", None])
+def test_frames_that_can_not_be_read_are_not_taken_for_none(damage):
+    """Their table is torn, of another form, empty or gone: a run that goes on would begin a new one."""
+    os.environ.pop("NO_SIGNAL")
+    kept = ("--frames", "4", "--checkpoint-every", "5")
+    assert run("plate.py", "--out", "out", *kept)[0] == 128 + signal.SIGTERM
+    os.environ["NO_SIGNAL"] = "yes"
+    about = Path("out/frames/about.json")
+    if damage is None:
+        about.unlink()
+    else:
+        about.write_text(damage)
+    before = content("out")
+    status, errors = run("--resume", "out")
+    assert status == 2 and errors.count("\n") == 1 and "about.json" in errors and content("out") == before
+
+
 OTHER = {"process": 1, "started": "0", "boot": "another", "host": "elsewhere"}
 
 
@@ -200,6 +217,17 @@ def test_file_has_one_writer_and_leaves_no_mark(tmp_path):
     with owned_file(path, "FILE"):
         pass
     assert list(tmp_path.glob(".*")) == []
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_folder_that_is_taken_away_meanwhile_is_said(replaced, tmp_path):
+    """Also where another one stands in its place, with what has been written since."""
+    folder = tmp_path / "out"
+    with pytest.raises(OSError, match="taken away meanwhile"), owned(folder):
+        folder.rename(tmp_path / "elsewhere")
+        if replaced:
+            folder.mkdir()
+            (folder / MARK).touch()
 
 
 def test_hand_written_scene_in_its_own_folder_is_kept():

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing.synchronize import SemLock
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ import pytest
 from tests.damaging import SCENE, command
 from tests.killing_commands import NUMBER, having
 from tests.test_owner import SLOW
+from warpsph.cli.queue import processes
+from warpsph.cli.stopping import TERMINAL
 from warpsph.cli.streams import Steady
 
 COMMAND = [sys.executable, "-m", "warpsph"]
@@ -77,6 +80,56 @@ def test_runs_of_a_sweep_end_with_it_and_keep_a_checkpoint(number):
     assert len(list(Path("out").rglob("checkpoint.npz"))) >= 1
 
 
+def deaf_to():
+    """Signals that do not reach this process."""
+    return signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no masks of signals on this system")
+def test_processes_of_a_sweep_leave_the_terminal_to_it_from_their_start():
+    """Ctrl-C while they import would end each of them in a traceback."""
+    with processes(1) as executor:
+        assert executor.submit(deaf_to).result(timeout=60) >= set(TERMINAL)
+    assert not deaf_to() & set(TERMINAL), "the sweep itself hears it"
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no masks of signals on this system")
+def test_signal_waits_until_processes_know_what_they_have_to_clean_up(monkeypatch):
+    """It came between a semaphore and the note of it: Python's own tracker wrote a warning of a leak."""
+    make, made = SemLock._make_name, []
+
+    def interrupted():
+        if not made:
+            os.kill(os.getpid(), signal.SIGINT)
+        made.append(make())
+        return made[-1]
+
+    monkeypatch.setattr(SemLock, "_make_name", staticmethod(interrupted))
+    with pytest.raises(KeyboardInterrupt):
+        processes(1)
+    assert len(made) > 1, "all of them were made"
+
+
+def test_processes_that_are_stopped_leave_nothing_to_wait_for():
+    """Those at work end, those that wait do not begin; no thread dies of it."""
+    with processes(2) as executor:
+        futures = [executor.submit(time.sleep, 60.0) for _ in range(20)]
+        begin = time.monotonic()
+        executor.stop()
+        assert all(future.done() for future in futures) and time.monotonic() - begin < 30.0
+    assert sum(future.cancelled() for future in futures) < 20, "some had been handed out"
+
+
+def test_progress_bar_makes_no_semaphore_of_the_system():
+    """A process of a report that is told to end would leave it behind, and Python's tracker would write so."""
+    code = (
+        "from multiprocessing.synchronize import SemLock\nSemLock.__init__ = None\n"
+        "from warpsph.cli.progress import bar\nbar(False, total=1).close()\nbar(True, total=1).close()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 STREAMS = {
     "no error stream": "2>&-",
     "no output": ">&-",
@@ -99,6 +152,14 @@ def test_streams_that_are_closed_or_full_do_not_end_a_run():
         assert history.startswith(b"step [-],time [s],width [m]\r\n"), name
         assert Path(f"{number}/summary.json").is_file(), name
         assert all(row.count(b",") == 2 for row in history.splitlines()), f"{name}: written into it"
+
+
+def test_no_file_takes_the_place_of_a_stream_that_is_closed():
+    """Or what a library writes to standard error would go into a file of the run's."""
+    opens = "open('a', 'w').fileno()"
+    code = f"from warpsph.cli.streams import steady_streams\nwith steady_streams():\n    assert {opens} > 2"
+    done = subprocess.run(["bash", "-c", '"$0" -c "$1" <&- >&- 2>&-', sys.executable, code], check=False)
+    assert done.returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -124,6 +185,16 @@ def test_letters_that_a_stream_can_not_show_are_written_otherwise(tmp_path):
     with (tmp_path / "out").open("w", encoding="ascii") as file:
         Steady(file).write("Δt = 3 µs…")
     assert (tmp_path / "out").read_text() == r"\u0394t = 3 \xb5s\u2026"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_stream_that_is_full_already_when_a_command_begins_is_no_error():
+    """In a program of one's own, which has written to it before."""
+    with open("/dev/full", "w") as file:
+        file.write("waits")
+        stream = Steady(file)
+        stream.write("is dropped")
+        stream.flush()
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 
 from tests.test_restart import slope
 from warpsph import Box, Elastic, Fixed, Scene, SceneError, Simulation, edge
+from warpsph.simulation.checkpoint import Checkpoint, write_checkpoint
 
 
 def bar(dim=2):
@@ -79,3 +80,20 @@ def test_forked_simulation_goes_on_with_one_thread_and_is_refused_with_two():
     assert "a forked process has no threads of its parent's" in in_child(lambda: further(two))
     assert np.array_equal(here, further(one)) and np.array_equal(here, further(two))
     assert np.array_equal(in_child(lambda: solved(bar)), solved(bar)), "a new one there"
+
+
+def test_run_on_two_threads_goes_on_from_its_checkpoint_in_another_process(tmp_path, monkeypatch):
+    """The number of the process is none of the state: with the former one's it would be refused as a fork."""
+    path = tmp_path / "checkpoint.npz"
+    with monkeypatch.context() as former:
+        former.setattr(os, "getpid", lambda: 1)
+        simulation = Simulation(slope(), device="cpu", threads=2)
+        simulation.run(until=0.02)
+        write_checkpoint(simulation, path)
+    again = Simulation(slope(), device="cpu", threads=2)
+    Checkpoint.read(path).restore(again)
+    again.run(until=0.1)
+    whole = Simulation(slope(), device="cpu")
+    whole.run(until=0.02)
+    whole.run(until=0.1)
+    assert np.array_equal(again.field("displacement"), whole.field("displacement"))

@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,9 +13,11 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom, Vt
+from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from warpsph.cli.main import main
+from warpsph.errors import DamagedError
+from warpsph.export.usd import usd_errors
 from warpsph.export.usd_live import LiveStage
 from warpsph.frames import Frames
 
@@ -238,12 +241,15 @@ def test_a_killed_run_leaves_a_stage_that_opens_with_all_its_frames(tmp_path):
     assert faults(tmp_path / "flat.usdc", out) == []
 
 
-def test_a_stage_that_can_not_be_written_costs_neither_the_frames_nor_the_run(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device"), DamagedError("frame", "000004.npz", "it can not be read")]
+)
+def test_a_stage_that_can_not_be_written_costs_neither_frames_nor_run(error, tmp_path, monkeypatch, capsys):
     refer = LiveStage._refer
 
     def full(stage):
         if len(stage._seen) > 3:
-            raise OSError(28, "No space left on device")
+            raise error
         refer(stage)
 
     monkeypatch.setattr(LiveStage, "_refer", full)
@@ -255,6 +261,33 @@ def test_a_stage_that_can_not_be_written_costs_neither_the_frames_nor_the_run(tm
     assert Frames(tmp_path).numbers == list(range(51))
     stage = Usd.Stage.Open(str(path))
     assert material(stage).GetPointsAttr().GetTimeSamples() == [0.0, 1.0, 2.0]
+
+
+def test_frames_that_somebody_has_removed_are_said_and_the_stage_stays_as_it_is(tmp_path, monkeypatch, capsys):
+    close, path = LiveStage.close, tmp_path / "live.usdc"
+
+    def close_without(stage):
+        shutil.rmtree(tmp_path / "frames")
+        before = path.read_bytes()
+        try:
+            close(stage)
+        finally:
+            assert path.read_bytes() == before
+
+    monkeypatch.setattr(LiveStage, "close", close_without)
+    arguments = ["run", "perzyna_bar", "--quiet", "--device", "cpu", "--out", str(tmp_path), "--usd", str(path)]
+    assert main(arguments) == 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "its frames are gone" in error
+
+
+def test_usd_writes_no_warnings_of_its_own(tmp_path, capfd):
+    """As the one of a disk that is taken away while it writes."""
+    with usd_errors(tmp_path / "a.usdc"):
+        Tf.Warn("said by USD")
+    assert capfd.readouterr().err == ""
+    Tf.Warn("said by USD")
+    assert "said by USD" in capfd.readouterr().err
 
 
 def _shift_time(stage):

@@ -67,7 +67,7 @@ class Lenient:
     def _attempt(self, task: Callable[[], Made]) -> Made | None:
         try:
             return task() if self._works else None
-        except (OSError, RuntimeError) as error:  # USD raises the latter
+        except (OSError, RuntimeError, SceneError) as error:  # of USD, and of frames that can not be read back
             self._works = False
             print(f"warpsph: {self._lost}, the run goes on ({' '.join(str(error).split())})", file=sys.stderr)
             return None

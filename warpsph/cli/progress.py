@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import math
+import threading
 
 from tqdm import tqdm
 
 from ..simulation.simulation import Simulation
+
+# In place of tqdm's, a semaphore that other processes know as well: one that is told to end would leave it behind.
+tqdm.set_lock(threading.RLock())
+
+
+def bar(show: bool, **options) -> tqdm:
+    """A bar, to be closed; with `show` false it shows nothing."""
+    return tqdm(disable=not show, leave=False, **options)
 
 
 class Progress:
@@ -19,11 +28,10 @@ class Progress:
     """
 
     def __init__(self, simulation: Simulation, end: float, show: bool):
-        self._bar = tqdm(
+        self._bar = bar(
+            show,
             total=end,
             initial=simulation.time,
-            disable=not show,
-            leave=False,
             mininterval=0.2,
             bar_format="{percentage:3.0f}%|{bar}| t = {n:.4g}/{total:.4g} s, {elapsed}<{remaining}{postfix}",
         )

@@ -7,18 +7,18 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time as clock
 from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from pathlib import Path
 
-from tqdm import tqdm
-
 from ..errors import DamagedError
 from ..simulation.device import THREADS, all_cores
 from .parent import end_with_parent, for_child
+from .progress import bar
 from .scene_run import SceneRun
-from .stopping import TERMINAL, terminal_waits
+from .stopping import TERMINAL, starting_processes
 
 try:
     from multiprocessing import resource_tracker
@@ -35,19 +35,31 @@ class Processes(ProcessPoolExecutor):
 
     def submit(self, *arguments, **named):
         """As of every executor; it may start a process."""
-        with terminal_waits():
+        with starting_processes():
             return super().submit(*arguments, **named)
+
+    def stop(self) -> None:
+        """Ask those at work to end, and begin no more.
+
+        What waits is cancelled by the executor's own thread: that of ours could do it just as that one says of the
+        same run that its process has gone, which is an error there.
+        """
+        ending = threading.Thread(target=self.shutdown, kwargs={"cancel_futures": True})
+        ending.start()
+        for process in multiprocessing.active_children():
+            process.terminate()
+        ending.join()
 
 
 def processes(jobs: int) -> Executor:
     """Makes each run in a process of this machine, which share the cores and end with this one."""
-    if resource_tracker is not None:
-        with terminal_waits():
-            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
     context = multiprocessing.get_context("spawn")  # Warp's threads do not survive a fork
     threads = max(1, all_cores() // jobs)
     arguments = (threads, for_child())
-    return Processes(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
+    with starting_processes():  # or a semaphore would be left that nobody knows of yet
+        if resource_tracker is not None:
+            resource_tracker.ensure_running()  # multiprocessing's own process, which a terminal ends with itself
+        return Processes(max_workers=jobs, mp_context=context, initializer=_begin, initargs=arguments)
 
 
 def make_missing(
@@ -76,8 +88,8 @@ def make_missing(
         print(f"{len(runs)} runs, {done} of them done already, in {folder}/", flush=True)
     show = not quiet and sys.stderr.isatty()
     form = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
-    with tqdm(total=sum(cost.values()), disable=not show, leave=False, bar_format=form) as bar, workers:
-        failed |= _Queue(missing, cost, folder, device, workers, bar, quiet).make()
+    with bar(show, total=sum(cost.values()), bar_format=form) as shown, workers:
+        failed |= _Queue(missing, cost, folder, device, workers, shown, quiet).make()
     return failed
 
 
@@ -119,10 +131,10 @@ class _Queue:
                     self._say(run, error)
                 self._show([run for future, run in pending.items() if future.running()])
         except BaseException:  # an interrupt above all: what is done stays
+            if isinstance(self._workers, Processes):
+                self._workers.stop()
             for future in pending:
                 future.cancel()
-            for process in multiprocessing.active_children():
-                process.terminate()
             raise
 
     def _say(self, run: SceneRun, error: BaseException | None) -> None:

@@ -68,16 +68,21 @@ def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def terminal_waits() -> Iterator[None]:
-    """Signals of the terminal wait meanwhile; processes that are started meanwhile begin deaf to them."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    former = signal.pthread_sigmask(signal.SIG_BLOCK, TERMINAL)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, former)
+def starting_processes() -> Iterator[None]:
+    """Signals that end a process wait meanwhile; processes that are started begin deaf to those of the terminal.
+
+    A mask alone would not do: it is one thread's, and any other one may get a signal for it.
+    """
+    came: list[int] = []
+    with handled(lambda number, frame: came.append(number)):
+        former = signal.pthread_sigmask(signal.SIG_BLOCK, TERMINAL) if hasattr(signal, "pthread_sigmask") else ()
+        try:
+            yield
+        finally:
+            if hasattr(signal, "pthread_sigmask"):
+                signal.pthread_sigmask(signal.SIG_SETMASK, former)
+    if came:
+        signal.raise_signal(came[0])
 
 
 class Stopper:

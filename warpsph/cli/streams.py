@@ -19,8 +19,8 @@ class Steady(io.TextIOBase):
 
     def __init__(self, stream: TextIO | None):
         self._stream = stream
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # a terminal that can not show a letter
+        # A letter that it can not show is written otherwise. What waits in it is written first, and may not go.
+        self._try(lambda: stream.reconfigure(errors="backslashreplace"))
 
     @property
     def encoding(self) -> str:

@@ -100,9 +100,8 @@ def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
         corners = 1 if kind.dim == 1 else kind.face_kind.corners
         check_array("faces", faces, kind="iu", shape=(None, corners))
         check_indices("faces", faces, len(nodes))
-        check_indices(
-            "face_cell", check_array("f", parts["face_cell"], kind="iu", shape=(len(faces),)), len(cells)
-        )
+        behind = check_array("face_cell", parts["face_cell"], kind="iu", shape=(len(faces),))
+        check_indices("face_cell", behind, len(cells))
         sides = check_array("face_side", parts["face_side"], kind="i", shape=(len(faces),))
         check_indices("face_side", sides - NO_SIDE, 2 * kind.dim - NO_SIDE)
         require(len(cells) > 0, "it has no cells")

@@ -6,8 +6,10 @@ VTK itself, an optional extra.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -53,6 +55,13 @@ def write_series(frames: Frames, path: Path) -> None:
         raise SceneError("FILE", str(path), f"{folder} holds what no export has written; choose another name")
     fresh = path.with_name(f".{folder.name}.new")
     empty(fresh, FRAME)
+    try:
+        _write_series(frames, path, folder, fresh)
+    finally:
+        empty(fresh, FRAME)  # where it has not taken its place
+
+
+def _write_series(frames: Frames, path: Path, folder: Path, fresh: Path) -> None:
     mark(fresh)
     root = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     collection = ElementTree.SubElement(root, "Collection")
@@ -62,11 +71,11 @@ def write_series(frames: Frames, path: Path) -> None:
         part = {"timestep": repr(frame.time), "part": "0", "file": f"{folder.name}/{file.name}"}
         ElementTree.SubElement(collection, "DataSet", part)
     ElementTree.indent(root)
-    path.unlink(missing_ok=True)
-    empty(folder, FRAME)
-    fresh.rename(folder)
     with whole(path) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+        path.unlink(missing_ok=True)
+        empty(folder, FRAME)
+        fresh.rename(folder)
 
 
 def _body(frame: Frame, fields: tuple[str, ...]):
@@ -121,10 +130,23 @@ def _array(name: str, values: np.ndarray, mesh: Mesh):
     return array
 
 
+@contextlib.contextmanager
+def _silent(part) -> Iterator[None]:
+    """VTK says nothing of its own meanwhile, in several lines as it does: what fails is an error of ours."""
+    shown = part.GetGlobalWarningDisplay()
+    part.SetGlobalWarningDisplay(False)
+    try:
+        yield
+    finally:
+        part.SetGlobalWarningDisplay(shown)
+
+
 def _write(body, path: Path) -> None:
     writer = _vtk()[2].vtkXMLPolyDataWriter()
     with whole(path) as temporary:
         writer.SetFileName(str(temporary))
         writer.SetInputData(body)
-        if not writer.Write() or writer.GetErrorCode():
+        with _silent(writer):
+            written = writer.Write() and not writer.GetErrorCode()
+        if not written:
             raise OSError(errno.EIO, "VTK can not write it", str(path))

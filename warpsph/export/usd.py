@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
 from .. import __version__
 from ..simulation.fields import component_names
@@ -56,11 +56,14 @@ def write_stage(frames: Frames, path: Path, colouring: Colouring | None = None) 
 
 @contextlib.contextmanager
 def usd_errors(path: Path) -> Iterator[None]:
-    """Turn USD's errors into an `OSError`: of a file that can not be written they are."""
+    """Turn USD's errors into an `OSError`, of a file that can not be written; it says nothing of its own."""
+    listener = UsdUtils.CoalescingDiagnosticDelegate()  # takes the warnings, which would go to standard error
     try:
         yield
     except Tf.ErrorException as error:
         raise OSError(errno.EIO, " ".join(str(error).split())[:300], str(path)) from None
+    finally:
+        del listener
 
 
 def check_written(path: Path) -> None:

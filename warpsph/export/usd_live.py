@@ -7,6 +7,7 @@ one flattened stage takes its place and the folder goes. A frame costs the same 
 
 from __future__ import annotations
 
+import errno
 import re
 from pathlib import Path
 
@@ -115,6 +116,12 @@ class LiveStage:
             check_written(temporary)
 
     def close(self) -> None:
-        """Put one flattened stage in the place of all."""
+        """Put one flattened stage in the place of all.
+
+        Raises:
+            OSError: it can not be written, or the frames are gone: a disk or somebody has taken them away.
+        """
+        if not self._frames:
+            raise OSError(errno.ENOENT, "its frames are gone", str(self._frames.run))
         write_stage(self._frames, self._path)
         empty(self._folder, CLIP)

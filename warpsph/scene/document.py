@@ -118,6 +118,7 @@ def decode(
     Raises:
         SceneError: something in it is not allowed; the message names the place or the field.
     """
+    _check_names(Scene, document, "scene")
     reader = _Reader({} if arrays is None else arrays, code)
     given = {name: reader.field(name, value) for name, value in document.items()}
     return _construct(Scene, given, "scene")
@@ -165,11 +166,16 @@ class _Reader:
         return _construct(kind, given, path)
 
 
-def _construct(kind: type, given: Mapping, path: str) -> object:
+def _check_names(kind: type, given: Mapping, path: str) -> None:
+    """Refuse a table with an entry that is no field of its class."""
     names = [entry.name for entry in fields(kind)]
     for name, value in given.items():
         if name not in names:
             raise SceneError(f"{path}.{name}", value, one_of(names, name))
+
+
+def _construct(kind: type, given: Mapping, path: str) -> object:
+    _check_names(kind, given, path)
     try:
         return kind(**given)
     except TypeError as error:  # a field without a default is missing

@@ -78,7 +78,7 @@ class Checkpoint:
             raise SceneError("checkpoint", str(path), allowed)
         with reading("checkpoint", path, damaged):
             _check_header(header)
-            require(header["content"] == digest(content), "its arrays are not those that were written")
+            require(header["content"] == seal(header, content), "it is not what was written")
         state, history = (
             {name.removeprefix(part): value for name, value in content.items() if name.startswith(part)}
             for part in (STATE, HISTORY)
@@ -130,6 +130,12 @@ def _check_header(header: Mapping) -> None:
         require(all(math.isfinite(stretch[name]) for name in ("start", "end")), "its steps are not ours")
 
 
+def seal(header: Mapping, arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of all that is in a checkpoint but this itself, its header's `content`, as hexadecimal digits."""
+    told = json.dumps({name: value for name, value in header.items() if name != "content"})
+    return digest({**arrays, "header": np.frombuffer(told.encode("utf-8"), dtype=np.uint8)})
+
+
 def write_checkpoint(
     simulation: Simulation, path: Path | str, history: History | None = None, run: Mapping | None = None
 ) -> None:
@@ -157,7 +163,7 @@ def write_checkpoint(
     }
     content = {f"{STATE}{name}": value for name, value in arrays.items()}
     content |= {f"{HISTORY}{name}": value for name, value in (history.state() if history else {}).items()}
-    header["content"] = digest(content)
+    header["content"] = seal(header, content)
     text = np.frombuffer(json.dumps(header).encode("utf-8"), dtype=np.uint8)
     packed = io.BytesIO()  # a disk that fills up then meets one plain write
     np.savez(packed, header=text, **content)

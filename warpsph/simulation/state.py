@@ -6,6 +6,7 @@ could be forgotten.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import is_dataclass
@@ -14,9 +15,11 @@ from typing import NamedTuple
 import numpy as np
 import warp as wp
 
+from ..device.launching import Launcher
 from ..storage.reading import check_indices, require
 
 PACKAGE = __package__.partition(".")[0]
+COUNTS = ("builds",)  # whole numbers that a run changes
 
 
 class Slot(NamedTuple):
@@ -64,7 +67,7 @@ def restore(root: object, saved: Mapping[str, np.ndarray], values: Mapping[str, 
     require(seats.keys() == saved.keys(), f"other arrays: {_some(seats.keys() ^ saved.keys())}")
     require(own.keys() == values.keys(), f"other numbers: {_some(own.keys() ^ values.keys())}")
     for path, number in own.items():
-        require(type(values[path]) is type(number), f"{path} is {values[path]!r}")
+        _check_number(path, number, values[path])
     for path, holding in seats.items():
         _check(path, holding, saved[path])
     _check_lists(root, saved, seats)
@@ -83,6 +86,14 @@ def restore(root: object, saved: Mapping[str, np.ndarray], values: Mapping[str, 
 
 def _some(names: Iterable[str]) -> str:
     return ", ".join(sorted(names)[:5])
+
+
+def _check_number(path: str, now: float | int | bool, new: object) -> None:
+    """Refuse a number that can not take the place of the one that is there: lengths of arrays stay as they are."""
+    right = type(new) is type(now) and math.isfinite(new)
+    if type(now) is int and path.rpartition(".")[2] not in COUNTS:
+        right = right and new == now
+    require(right, f"{path} is {new!r}")
 
 
 def _check(path: str, holding: list[Slot], new: np.ndarray) -> None:
@@ -160,8 +171,11 @@ def slots(root: object) -> Iterator[Slot]:
 
 
 def _is_part(value: object) -> bool:
-    """Whether it is an object of this package with attributes, structs of arrays included; no types, no scene."""
-    if isinstance(value, type) or not hasattr(value, "__dict__"):
+    """Whether it is an object of this package with attributes, structs of arrays included.
+
+    No types and no scene; nor what launches kernels, which belongs to the process and not to the state.
+    """
+    if isinstance(value, type | Launcher) or not hasattr(value, "__dict__"):
         return False
     modules = [kind.__module__ for kind in type(value).__mro__]
     return any(m.partition(".")[0] == PACKAGE and not m.startswith(f"{PACKAGE}.scene") for m in modules)

@@ -9,6 +9,7 @@ has lost the folder, as has one from before the machine was started again; of an
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import re
@@ -37,11 +38,14 @@ def owned(folder: Path, option: str = "--out") -> Iterator[None]:
 
     Raises:
         SceneError: another process, or another part of this one, is at work there, or it can not be written.
+        OSError: at the end it is not there any more, or is another one: a disk or somebody has taken it away.
     """
     with _writable(option, folder):
         folder.mkdir(parents=True, exist_ok=True)
-    with _held(folder / MARK, option, folder):
+    with _held(folder / MARK, option, folder) as handle:
         yield
+        if not _is(folder / MARK, handle):
+            raise OSError(errno.ENOENT, "it was taken away meanwhile, with what had been written", str(folder))
 
 
 @contextlib.contextmanager
@@ -107,7 +111,7 @@ def _writable(option: str, path: Path, kind: str = "folder") -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _held(mark: Path, option: str, target: Path, kind: str = "folder") -> Iterator[None]:
+def _held(mark: Path, option: str, target: Path, kind: str = "folder") -> Iterator[int]:
     with _writable(option, target, kind):
         file = _locked(mark)
     if file is None:
@@ -124,7 +128,7 @@ def _held(mark: Path, option: str, target: Path, kind: str = "folder") -> Iterat
         with _writable(option, target, kind):
             _write(handle, _this_process())
         try:
-            yield
+            yield handle
         finally:
             with contextlib.suppress(OSError):
                 _write(handle, {})
@@ -146,11 +150,20 @@ def _locked(mark: Path) -> tuple[int, bool] | None:
                     return None
                 except OSError:  # this file system has no locks
                     locks = False
-            if os.fstat(handle).st_ino == os.stat(mark).st_ino:
+            if _is(mark, handle):  # its owner may have removed it meanwhile
                 return handle, locks
-        except FileNotFoundError:  # its owner has removed it meanwhile
-            pass
+        except OSError:
+            os.close(handle)
+            raise
         os.close(handle)
+
+
+def _is(mark: Path, handle: int) -> bool:
+    """Whether the file of that name is the open one."""
+    try:
+        return os.path.samestat(os.fstat(handle), os.stat(mark))
+    except FileNotFoundError:
+        return False
 
 
 def _this_process() -> dict[str, object]:
