@@ -51,7 +51,6 @@ def scene(p):
         ],
         velocity=lambda x, y: (0.01 * y, 0.0),
         stress=lambda x, y: (-100.0, -200.0, 0.0, -100.0),
-        free_surface=FreeSurface(),
         body_force=BodyForce((0.0, -9.81), Ramp(0.5)),
         duration=0.5,
         numerics=p.numerics,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import SceneError
 from ..mesh.continuum import Continuum
+from ..mesh.mesh import Mesh
 from ..validate import choice, number
 from .registry import KERNELS
 from .scheme import Scheme, scheme_of
@@ -15,7 +16,6 @@ SOURCE_SCHEMES = ("analytic", "rk4")
 # What Blanc and Pastor computed their cases with: the published step filters least at the largest step.
 PUBLISHED = {"velocity_scheme": "blanc-pastor", "source_scheme": "rk4", "courant": 1.0}
 MOST_SHARPENING = 0.7  # more turns dispersion round, and shortens the stable step
-SHARPENING = 2.0 / 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +33,10 @@ class Numerics:
         smoothing_ratio: smoothing length over spacing h/Δx [-] of sums over neighbours; the kernel's own default
             unless given. None with `cells`.
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
-        sharpening: c of `cells` [-], 0 to 0.7, 2/3 unless given: how far what a mean over a cell's corners takes
-            off short waves is put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes
-            longer. None with sums over neighbours.
+        sharpening: c of `cells` [-], 0 to 0.7: how far what a mean over a cell's corners takes off short waves is
+            put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer. Unless given
+            ⅔ (1 − C²/4), C = c_p Δt over the spacing: waves along a lattice are then not dispersed. None with sums
+            over neighbours.
     """
 
     velocity_scheme: str = "cells"
@@ -51,9 +52,9 @@ class Numerics:
         choice("source_scheme", self.source_scheme, SOURCE_SCHEMES)
         if scheme.sums is None:
             self._refuse_what_sums_take()
-            sharpening = SHARPENING if self.sharpening is None else self.sharpening
-            sharpening = number("sharpening", sharpening, at_least=0.0, at_most=MOST_SHARPENING)
-            object.__setattr__(self, "sharpening", sharpening)
+            if self.sharpening is not None:
+                sharpening = number("sharpening", self.sharpening, at_least=0.0, at_most=MOST_SHARPENING)
+                object.__setattr__(self, "sharpening", sharpening)
         else:
             if self.sharpening is not None:
                 allowed = f"velocity_scheme {self.velocity_scheme} knows none; leave it out"
@@ -84,6 +85,15 @@ class Numerics:
     def scheme(self) -> Scheme:
         """The scheme that `velocity_scheme` names."""
         return scheme_of(self.velocity_scheme)
+
+    def sharpening_of(self, mesh: Mesh, wave_speed: float) -> float:
+        """c of `cells` for a body whose fastest waves have that speed [m/s]."""
+        if self.sharpening is not None:
+            return self.sharpening
+        advance = self.courant * self.scheme.spacing(mesh)  # c_p Δt
+        if self.time_step is not None:
+            advance = wave_speed * self.time_step
+        return 2.0 / 3.0 * (1.0 - 0.25 * (advance / mesh.spacing) ** 2)
 
     @property
     def support(self) -> float:

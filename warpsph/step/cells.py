@@ -48,7 +48,8 @@ class CellStepper(Stepper):
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
         driven = scene.boundary.functions
         clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
-        c = self._sharpening = scene.numerics.sharpening
+        c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
+        self._sharpening = c
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
         n, moves = len(scene.mesh.nodes), scene.large_displacements
