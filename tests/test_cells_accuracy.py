@@ -84,7 +84,7 @@ def impact(shape, numerics):
 
 
 def test_fronts_of_an_impact():
-    """Sums over neighbours at their best Courant number: 0.0171, 0.0073 (METHOD section 8); here 0.0153, 0.0049."""
+    """Sums over neighbours at the best Courant number: 0.0171, 0.0073 (METHOD section 8); now 0.0153, 0.0049."""
     for columns, bound in ((200, 0.0171), (800, 0.0073)):
         error, ringing = impact(Box((1.0, 2.0 / columns), 1.0 / columns), Numerics(velocity_scheme="cells"))
         assert error <= bound and ringing <= 0.03

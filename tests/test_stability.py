@@ -74,11 +74,11 @@ def test_analysis_is_that_of_the_code(dim):
 
 
 def stepped(simulation, phi):
-    """φ (n, d + s) after one step."""
+    """φ (n, d + s) after one step of the stepper: no run, and no books, know of states from elsewhere."""
     point = simulation.nodes.point.numpy()
     point["phi"] = phi
     simulation.nodes.point.assign(point)
-    simulation.step()
+    simulation.stepper.advance([0.0], simulation.time_step_limit)
     return simulation.nodes.point.numpy()["phi"].copy()
 
 
