@@ -124,7 +124,7 @@ def test_stopped_run_leaves_what_a_reader_needs(capsys):
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["stopped"] and summary["error"] is None and summary["steps"] == STOP
     assert {path.name for path in folder.iterdir()} == {
-        *("summary.json", "history.csv", "history.png", "field.png", "frames"),
+        *("summary.json", "history.csv", "history.png", "energy.png", "field.png", "frames"),
         *("scene.toml", "scene_file.py", "checkpoint.npz", ".warpsph"),
     }
     kept = len(Frames("out"))

@@ -71,7 +71,7 @@ def test_history_has_every_step_and_survives_in_its_file(tmp_path):
     simulation.run(observers=[history])
     # not closed: a run that is killed leaves the rows it had
     lines = (tmp_path / "history.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "step [-],time [s],v [m/s]"
+    assert lines[0].startswith("step [-],time [s],v [m/s],energy.kinetic [J/m²],")
     assert len(lines) == simulation.steps + 2
     assert [float(line.split(",")[2]) for line in lines[1:]] == history["v"].tolist()
 

@@ -92,7 +92,7 @@ class Scene:
     ...     duration=1.0,
     ... )
     >>> scene.boundary.nodes, scene.initial_velocity.shape
-    (array([0, 1, 2, 3, 5, 6, 7, 8]), (9, 2))
+    (array([0, 3, 6]), (9, 2))
     """
 
     shape: Shape
