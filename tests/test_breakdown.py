@@ -69,6 +69,19 @@ def test_a_folded_cell_is_noted_and_named_with_its_nodes():
     )
 
 
+@pytest.mark.filterwarnings("error")
+def test_positions_beyond_all_numbers_are_named_without_a_warning():
+    """Lengths and volumes of the cells overflow."""
+    simulation = Simulation(Scene(shape=Box((1.0, 1.0), 0.25), material=SOFT, duration=1.0), device="cpu")
+    moved = simulation.nodes.displacement.numpy()
+    moved[0] = 1e300
+    simulation.nodes.displacement.assign(moved)
+    point = simulation.nodes.point.numpy()
+    point["x"][0] = 1e300
+    simulation.nodes.point.assign(point)
+    assert "cell 0 folded" in str(breakdown.breakdown(simulation, "folded", 1.0))
+
+
 @pytest.mark.parametrize("scheme", ["cells", "blanc-pastor"])
 def test_neighbours_part_no_faster_than_waves_but_a_body_may(scheme):
     """The same speed, ten times that of waves: of the whole body, or of every second node."""

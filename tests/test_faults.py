@@ -5,6 +5,7 @@ import errno
 import os
 import re
 import resource
+import signal
 import stat
 import subprocess
 import sys
@@ -170,6 +171,24 @@ def test_history_waits_for_a_disk_that_is_full(tmp_path, monkeypatch, capsys):
     record.close()
     assert path.read_bytes() == expected
     assert capsys.readouterr().err == f"warpsph: {path} can not be written now (No space left on device)\n"
+
+
+def test_history_that_can_not_begin_leaves_the_former_one(tmp_path):
+    """A run that goes on writes it anew; a disk that is full then must not leave an empty one."""
+    path = tmp_path / "history.csv"
+    record = History(Simulation(bar(), device="cpu"), path)
+    record.close()
+    before, more = path.read_bytes(), {"rows": np.zeros((1000, 3)), "next": np.array(0.0)}
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limit[1]))
+    try:
+        with pytest.raises(OSError):
+            History(Simulation(bar(), device="cpu"), path, more)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["history.csv"]
 
 
 def test_history_that_lost_its_last_rows_says_so(tmp_path, capsys):

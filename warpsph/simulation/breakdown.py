@@ -27,7 +27,8 @@ def breakdown(simulation, fault: str, dt: float) -> BreakdownError:
         dt: the step's length [s].
     """
     kind, seen = _SEEN[fault]
-    what, node, advice = seen(simulation, dt)
+    with np.errstate(all="ignore"):  # positions may be anything by now
+        what, node, advice = seen(simulation, dt)
     place = simulation.mesh.nodes[node]
     return kind(what, step=simulation.steps, time=simulation.time, node=node, position=place, advice=advice)
 

@@ -140,24 +140,35 @@ class _Rows:
     """A CSV file that always ends with a whole row, also where the disk fills up.
 
     It takes the place of a former one when its first rows are in it.
+
+    Raises:
+        OSError: the disk does not take them; a former one is then as it was.
     """
 
     def __init__(self, path: Path, rows: bytes):
         self._path, self._waiting, self._end, self._failed = path, rows, 0, False
         with whole(path) as temporary:
             self._file = temporary.open("wb", buffering=0)
-            self._flush()
+            try:
+                self._put()
+            except OSError:
+                self._file.close()
+                raise
 
     def write(self, rows: bytes) -> None:
         """Add whole rows; those that the disk does not take are kept for the next time."""
         self._waiting += rows
         self._flush()
 
-    def _flush(self) -> None:
+    def _put(self) -> None:
         left = self._waiting
+        while left:
+            left = left[self._file.write(left) :]
+        self._end, self._waiting = self._end + len(self._waiting), b""
+
+    def _flush(self) -> None:
         try:
-            while left:
-                left = left[self._file.write(left) :]
+            self._put()
         except OSError as error:
             with contextlib.suppress(OSError):
                 self._file.truncate(self._end)
@@ -165,8 +176,6 @@ class _Rows:
             if not self._failed:
                 print(f"warpsph: {self._path} can not be written now ({error.strerror})", file=sys.stderr)
             self._failed = True
-        else:
-            self._end, self._waiting = self._end + len(self._waiting), b""
 
     def close(self) -> None:
         """Try once more what is waiting, and say so when it is lost."""
