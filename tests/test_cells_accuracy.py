@@ -97,6 +97,16 @@ def test_fronts_on_jittered_triangles():
     assert error <= 0.028
 
 
+@pytest.mark.parametrize("cells", ["lattice", "triangles"])
+def test_sharpening_is_that_of_the_cells_however_a_body_was_made(cells):
+    """⅔ (1 − C²/4) with C of the cells: the same for a box that is mapped to ten times or a tenth of its size."""
+    box = Box((1.0, 1.0), 0.25, cells=cells)
+    advance = 0.8 * (1.0 if cells == "lattice" else 2.0 / 3.0)  # triangles: the Courant number's Δx is ⅔ of it
+    for factor in (1.0, 10.0, 0.1):
+        mesh = box.mapped(lambda x, y, f=factor: (f * x, f * y)).mesh()
+        assert Numerics().sharpening_of(mesh, 1.0) == pytest.approx(2.0 / 3.0 * (1.0 - 0.25 * advance**2))
+
+
 class Tip:
     """Follows the deflection of a node."""
 

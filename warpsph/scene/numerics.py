@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..errors import SceneError
 from ..mesh.continuum import Continuum
 from ..mesh.mesh import Mesh
@@ -35,8 +37,8 @@ class Numerics:
         time_step: Δt [s]; from `courant` and the stiffness of the sources unless given.
         sharpening: c of `cells` [-], 0 to 0.7: how far what a mean over a cell's corners takes off short waves is
             put back (docs/method.md, section 8). Fronts, bending and waves gain, a step takes longer. Unless given
-            ⅔ (1 − C²/4), C = c_p Δt over the spacing: waves along a lattice are then not dispersed. None with sums
-            over neighbours.
+            ⅔ (1 − C²/4), C = c_p Δt over the mean size of the cells: waves along a lattice are then not dispersed.
+            None with sums over neighbours.
     """
 
     velocity_scheme: str = "cells"
@@ -93,7 +95,8 @@ class Numerics:
         advance = self.courant * self.scheme.spacing(mesh)  # c_p Δt
         if self.time_step is not None:
             advance = wave_speed * self.time_step
-        return 2.0 / 3.0 * (1.0 - 0.25 * (advance / mesh.spacing) ** 2)
+        size = (np.mean(mesh.cell_volumes()) / mesh.kind.volume) ** (1.0 / mesh.dim)  # of a lattice Δx, as mapped
+        return 2.0 / 3.0 * (1.0 - 0.25 * float(advance / size) ** 2)
 
     @property
     def support(self) -> float:
