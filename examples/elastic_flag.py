@@ -12,7 +12,7 @@ from warpsph import BodyForce, Box, Check, Elastic, Fixed, NodeValue, Output, Pa
 
 LENGTH, THICKNESS, GRAVITY = 0.35, 0.02, 2.0  # [m], [m], [m/s²]
 LOWEST, HIGHEST, PERIOD = -0.1288, 1.5e-3, 0.913  # of the tip [m], [m]; [s]
-SHORT = ("duration=0.92",)
+SHORT = ("duration=1.9",)
 PARAMETERS = (
     Parameter("spacing", 0.005, "m", "distance between neighbouring nodes"),
     Parameter("duration", 2.8, "s", "simulated time: three swings"),

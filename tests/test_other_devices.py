@@ -77,7 +77,7 @@ def test_what_the_compilers_are_told_of_arrays_is_true(device, precision, dim, s
         "lists._nodes.",
         "_numbers",
         "_forces",
-        "_means.",
+        "_sharpening.means.",
     )
     every = (slot for slot in slots(restored.stepper) if isinstance(slot.value, wp.array))
     arrays = {slot.path: slot.value for slot in every if slot.path.startswith(told_of)}

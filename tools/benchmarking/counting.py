@@ -13,20 +13,20 @@ import warp as wp
 
 from warpsph import Simulation
 
-NODES, MEANS = "body.nodes.", "_means."
+NODES, MEANS = "body.nodes.", "_sharpening.means."
 # kernel: (arrays read, arrays written), as attributes of the stepper, for the default numerics.
 TRAFFIC = {
     "kick": (
         (NODES + "point", NODES + "acceleration", NODES + "half", "conditions.row"),
         (NODES + "half",),
     ),
-    "strain": (("body.corners", NODES + "half"), ("_numbers",)),
+    "strain": (("body.corners", NODES + "half", NODES + "flowed"), ("_numbers",)),
     "rate": (
         ("body.node_cells.place", "_numbers", NODES + "mass"),
         (NODES + "volume", NODES + "velocity_gradient"),
     ),
     "rate_mean": (
-        ("body.corners", "_numbers", NODES + "velocity_gradient", NODES + "flowed"),
+        ("body.corners", "_numbers", NODES + "velocity_gradient"),
         (MEANS + "weight", MEANS + "rate"),
     ),
     "stress": (

@@ -11,14 +11,69 @@ c_T = c e_T is 0, or limit loads rise.
 
 from functools import cache
 
+import numpy as np
 import warp as wp
 
 from ..device.arrays import packed
 from ..device.compiling import forward_kernel
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..state.cell_body import cell_node_types
+from ..state.cell_body import CellBody, cell_node_types
 from ..state.cells import NodeCells, cell_in_slot, corner_place
+
+
+class Sharpening:
+    """K of a body; with c = 0 it is the identity, and does nothing.
+
+    Args:
+        body: the body.
+        c: how far waves are sharpened [-].
+        numbers: what the strain pass leaves of each cell.
+
+    Attributes:
+        on: whether c > 0.
+        means: `Means` of the cells.
+        kernels: what it launches.
+    """
+
+    def __init__(self, body: CellBody, c: float, numbers: wp.array):
+        space, kind, device = body.space, body.kind, body.launcher.device
+        self._body, self._c, self._numbers, self.on = body, c, numbers, c > 0.0
+        self.means, cells = sharp_types(space)(), body.corners.shape[0] if self.on else 1
+        self.means.weight = wp.zeros(cells, dtype=space.real, device=device)
+        self.means.rate = wp.zeros(cells, dtype=space.types.tensor, device=device)
+        self.means.stress = wp.zeros(cells, dtype=space.types.stress, device=device)
+        self._rate_mean, self._stress_mean = rate_mean_kernel(space, kind), stress_mean_kernel(space, kind)
+        self._sharpen = sharpen_kernel(space, kind, body.slots)
+        self.kernels = (self._rate_mean, self._stress_mean, self._sharpen) if self.on else ()
+
+    def weigh(self) -> None:
+        """Weights of the cells, and means of L: what `around` needs to sharpen L."""
+        if self.on:
+            body = self._body
+            inputs = [self._c, body.corners, self._numbers, body.nodes, self.means]
+            body.launcher.launch(self._rate_mean, body.corners, inputs)
+
+    def stresses(self) -> None:
+        """K σ of the nodes."""
+        if self.on:
+            body, launch = self._body, self._body.launcher.launch
+            launch(self._stress_mean, body.corners, [body.corners, body.nodes, self.means])
+            launch(self._sharpen, body.nodes.point, [body.straining, self.means, body.nodes])
+
+    def undo(self, given: np.ndarray) -> None:
+        """Let σ be what, sharpened, is the stress that was given, so that what balanced the loads still does.
+
+        The eigenvalues of K are within [1, 1 + c]: an error is a quarter of what it was, or less, each time.
+        """
+        if not self.on:
+            return
+        points, d = self._body.nodes.point, self._body.space.dim
+        values = points.numpy()
+        for _ in range(2 * np.finfo(values["phi"].dtype).precision):
+            self.stresses()
+            values["phi"][:, d:] += (given - self._body.nodes.sharpened.numpy()) / (1.0 + 0.5 * self._c)
+            points.assign(values)
 
 
 @cache

@@ -19,7 +19,7 @@ from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
 from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
-from ..operators.sharpening import rate_mean_kernel, sharp_types, sharpen_kernel, stress_mean_kernel
+from ..operators.sharpening import Sharpening
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
@@ -49,7 +49,6 @@ class CellStepper(Stepper):
         driven = scene.boundary.functions
         clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
         c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
-        self._sharpening = c
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
         n, moves = len(scene.mesh.nodes), scene.large_displacements
@@ -64,29 +63,23 @@ class CellStepper(Stepper):
         self._limit = CellLimit(body, clock)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
         kind, slots, share = body.kind, body.slots, corner_share(c)
-        self._means = sharp_types(space)()
-        self._means.weight = wp.zeros(cells, dtype=real, device=device)
-        self._means.rate = wp.zeros(cells if c else 1, dtype=space.types.tensor, device=device)
-        self._means.stress = wp.zeros(cells if c else 1, dtype=space.types.stress, device=device)
+        self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
         self._strain = strain_kernel(space, kind, body.law.flows, share)
         self._rate = rate_kernel(space, kind, slots)
-        self._rate_mean = rate_mean_kernel(space, kind)
-        self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=c > 0.0)
-        self._stress_mean = stress_mean_kernel(space, kind)
-        self._sharpen = sharpen_kernel(space, kind, slots)
-        self._force = force_kernel(space, kind, body.law, c > 0.0)
+        self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=sharpening.on)
+        self._force = force_kernel(space, kind, body.law, sharpening.on)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
-        if c > 0.0:
-            kernels += [self._rate_mean, self._stress_mean, self._sharpen]
         super().__init__(launcher, clock, parts=(self._limit,))
-        kernels += [*clock.kernels, *self.loads.kernels, *self._limit.kernels, *self._energy.kernels]
+        for part in (clock, sharpening, self.loads, self._limit, self._energy):
+            kernels += part.kernels
         load_kernels(kernels, device)
         self._limit.refresh()
         self.clock.begin([0.0], 0.0)
-        if c > 0.0 and scene.initial_stress.any():
-            self._unsharpen(scene.initial_stress)
+        if scene.initial_stress.any():
+            self._rates()
+            sharpening.undo(scene.initial_stress)
         self.step()  # of no length: what the initial state asks for, and the accelerations it begins with
         self._energy.open()
 
@@ -107,29 +100,15 @@ class CellStepper(Stepper):
         self._energy.begin()
         return outcome
 
-    def _unsharpen(self, given: np.ndarray) -> None:
-        """Let σ be what, sharpened, is the stress that was given, so that what balanced the loads still does.
-
-        The eigenvalues of K are within [1, 1 + c]: an error is a quarter of what it was, or less, each time.
-        """
-        phi, d = self.body.nodes.point.numpy(), self.body.space.dim
-        self._rates()
-        for _ in range(2 * np.finfo(phi["phi"].dtype).precision):
-            self._sharpened()
-            missing = given - self.body.nodes.sharpened.numpy()
-            phi["phi"][:, d:] += missing / (1.0 + 0.5 * self._sharpening)
-            self.body.nodes.point.assign(phi)
-
     def step(self) -> None:
         """Advance the nodes by the clock's Δt."""
         body, clock, launch = self.body, self.clock, self.body.launcher.launch
         nodes, points, dt, faults = body.nodes, body.nodes.point, clock.time_step, clock.faults
         self._rates()
-        inputs = [body.parameters, dt, body.straining, self._means, nodes, body.internals]
+        inputs = [body.parameters, dt, body.straining, self._sharpening.means, nodes, body.internals]
         inputs += [self._limit.outdated, faults]
-        launch(self._stress, points, inputs, gathers=self._sharpening > 0.0)
-        if self._sharpening > 0.0:
-            self._sharpened()
+        launch(self._stress, points, inputs, gathers=self._sharpening.on)
+        self._sharpening.stresses()
         damping, material = body.scene.damping, body.scene.material
         modulus = material.density * material.wave_speed(body.space.dim) ** 2
         inputs = [body.parameters, modulus, dt, body.corners, body.cell_mass, nodes, self._numbers]
@@ -148,14 +127,7 @@ class CellStepper(Stepper):
         launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
-        if self._sharpening > 0.0:
-            launch(self._rate_mean, corners, [self._sharpening, corners, self._numbers, nodes, self._means])
-
-    def _sharpened(self) -> None:
-        """K σ of the nodes."""
-        body, launch = self.body, self.body.launcher.launch
-        launch(self._stress_mean, body.corners, [body.corners, body.nodes, self._means])
-        launch(self._sharpen, body.nodes.point, [body.straining, self._means, body.nodes])
+        self._sharpening.weigh()
 
 
 def spacing(mesh: Mesh) -> float:
