@@ -22,7 +22,7 @@ class Setting:
 
     Attributes:
         spacing: [m].
-        velocity_scheme, courant, kernel, smoothing_ratio, source_scheme: as in `Numerics`.
+        velocity_scheme, courant, kernel, smoothing_ratio, source_scheme, sharpening: as in `Numerics`.
         precision: float32 or float64.
     """
 
@@ -32,6 +32,7 @@ class Setting:
     kernel: str | None = None
     smoothing_ratio: float | None = None
     source_scheme: str = Numerics.source_scheme
+    sharpening: float | None = None
     precision: str = "float64"
 
     def numerics(self) -> dict:
@@ -49,6 +50,8 @@ class Setting:
             return self.kernel
         if self.smoothing_ratio != default.smoothing_ratio:
             return f"h = {self.smoothing_ratio:g} Δx"
+        if self.sharpening != default.sharpening:
+            return f"sharpening {self.sharpening:g}"
         changed = [
             name for name in ("source_scheme", "precision") if getattr(self, name) != getattr(default, name)
         ]
@@ -67,15 +70,18 @@ NAMES = tuple(field.name for field in fields(Setting))
 
 def parse(texts: dict[str, str]) -> Setting:
     """The setting of a row of a CSV file."""
-    kinds = {name: float if name in ("spacing", "courant", "smoothing_ratio") else str for name in NAMES}
+    numbers = ("spacing", "courant", "smoothing_ratio", "sharpening")
+    kinds = {name: float if name in numbers else str for name in NAMES}
     return Setting(**{name: kinds[name](texts[name]) if texts[name] else None for name in NAMES})
 
 
 def variants(spacing: float, flows: bool, ratios: tuple[float, ...]) -> Iterator[Setting]:
     """Every setting at one spacing; of source schemes only where sources matter."""
     base, sums = Setting(spacing), Setting(spacing, SUMS)
-    for scheme, courant in product(SCHEMES, COURANT):
-        yield replace(base, velocity_scheme=scheme, courant=courant)
+    for (scheme, record), courant in product(SCHEMES.items(), COURANT):
+        if record.courant_limit is None or courant <= record.courant_limit:
+            yield replace(base, velocity_scheme=scheme, courant=courant)
+    yield replace(base, sharpening=0.0)
     for kernel in [*KERNELS][1:]:  # the first is the default
         yield replace(sums, kernel=kernel)
     for ratio in ratios:
