@@ -11,6 +11,7 @@ import sys
 import traceback
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.undrawn import as_a_dot
@@ -133,6 +134,20 @@ def damaged(folder, count, seed):
     for _ in range(count):
         found += [wrong] if (wrong := trial(folder / "run", folder / "try", chance)) else []
     return found
+
+
+def out_of_range(values):
+    """The array with an index that leads out of any table."""
+    changed = values.copy()
+    changed.flat[1] = 10**6
+    return changed
+
+
+def nan(values):
+    """The array with a value that is no number."""
+    changed = values.copy()
+    changed.flat[0] = np.nan
+    return changed
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from tests.damaging import nan, out_of_range
 from tests.test_restart import SCENES, resumed, started
 from warpsph import SceneError
 from warpsph.errors import DamagedError
@@ -46,18 +47,6 @@ def forged(saved, folder, name, change):
     header["content"] = seal(header, content)
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     np.savez(folder / "checkpoint.npz", header=text, **content)
-
-
-def out_of_range(values):
-    changed = values.copy()
-    changed.flat[1] = 10**6
-    return changed
-
-
-def nan(values):
-    changed = values.copy()
-    changed.flat[0] = np.nan
-    return changed
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from tests.damaging import nan, out_of_range
 from warpsph import (
     Box,
     Elastic,
@@ -251,18 +252,6 @@ def test_history_is_read_up_to_its_last_whole_line(tmp_path):
     columns, units = read_history(tmp_path / "history.csv")
     assert units == {"step": "-", "time": "s", "load at top": "N"}
     np.testing.assert_array_equal(columns["load at top"], [1.5, 2.5])
-
-
-def out_of_range(values):
-    changed = values.copy()
-    changed.flat[1] = 10**6
-    return changed
-
-
-def nan(values):
-    changed = values.copy()
-    changed.flat[0] = np.nan
-    return changed
 
 
 @pytest.fixture(scope="module")
