@@ -73,6 +73,8 @@ def _schemes(results: Sequence[Result]) -> dict[str, tuple[list[Result], dict]]:
     for scheme in SCHEMES:
         for courant in COURANT:
             base = [r for r in results if r.setting == Setting(r.setting.spacing, scheme, courant)]
+            if not base:
+                continue
             line, marker = LINES[courant]
             style = {"color": COLOURS[scheme], "linestyle": line, "marker": marker}
             lines[f"{scheme}, C = {courant:g}"] = base, style
