@@ -122,7 +122,7 @@ NAMES = {
     "rk4",
     "analytic",
 }
-NAMES |= {"taylor", "blanc-pastor", "improved", "marrone"}
+NAMES |= {"cells", "taylor", "blanc-pastor", "improved", "marrone"}
 
 ELASTIC = {"young_modulus": 1e5, "poisson_ratio": 0.3, "density": 2000.0}
 SOIL = {**ELASTIC, "fluidity": 2.0, "yield_size": 200.0, "exponent": 1.0, "hardening": -1e3, "residual_ratio": 0.1}
@@ -398,8 +398,10 @@ WRONG = {
 
 
 def _no_size(value):
-    """Three finite lengths are a size, if each is a whole number of spacings; none of ours is."""
-    return value != (1.0,) and value != (1.0, 2.0, 3.0)
+    """One to three lengths, each a whole number of spacings, are a size: chance may find [1.0, 1.0, 1.0]."""
+    if not isinstance(value, tuple | list) or not 1 <= len(value) <= 3:
+        return True
+    return not all(isinstance(part, float) and part > 0.0 and part % 0.25 == 0.0 for part in value)
 
 
 def check_refusal(name, value):
