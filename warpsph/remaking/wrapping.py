@@ -1,0 +1,178 @@
+"""The star of a node, found by itself: its neighbours one after the other, counterclockwise, among the nodes near it.
+
+A star begins with the nearest neighbour, or, of a node on the outline, with the one that follows it there, and ends
+with the one before. Nodes behind an edge of the outline are not seen, so cells never leave the body, and fill it: a
+triangulation of Delaunay under the constraint of the outline. Cells whose circles are within reach are certain. So
+are all, if each is found by its three corners, whatever their circles: `tables` looks.
+"""
+
+import warp as wp
+
+from ..device.compiling import forward_kernel
+from .exact import Seen, met_before, square, turn
+from .outline import INSIDE
+from .sight import hides, outside, seen_from
+from .sites import Site
+
+# The most nodes that a star sees, edges of the outline that it sees, and neighbours that it has.
+MOST_SEEN, MOST_EDGES, MOST_NEIGHBOURS = 96, 48, 24
+# What became of a star.
+CERTAIN, UNCERTAIN, OPEN, CROWDED, COINCIDENT = 0, 1, 2, 3, 4
+
+
+@wp.struct
+class Stars:
+    """A star a node.
+
+    Attributes:
+        degree: how many neighbours it has; 0 if it was not found.
+        row: them, counterclockwise: on the outline from the node after to the one before, elsewhere from the one
+            of least index.
+        fate: what became of it.
+    """
+
+    degree: wp.array(dtype=wp.int32)
+    row: wp.array2d(dtype=wp.int32)
+    fate: wp.array(dtype=wp.int32)
+
+
+@wp.func
+def nearest(seen: wp.array(dtype=Seen), count: int) -> int:
+    """Number of the nearest node, −1 without any: the one at whose line of equal power, at Λ/2|k|, i ends first."""
+    found, least = int(-1), wp.float64(wp.inf)
+    for k in range(count):
+        lift = wp.float64(seen[k].lift)
+        distance = lift * wp.abs(lift) / wp.float64(square(seen[k].x, seen[k].y))
+        if distance < least or (distance == least and seen[k].id < seen[found].id):
+            found = k
+            least = distance
+    return found
+
+
+@wp.func
+def next_after(i: int, j: int, seen: wp.array(dtype=Seen), count: int) -> int:
+    """Number of the neighbour that follows j, −1 if none is to the left of it."""
+    edge, found = seen[j], int(-1)
+    for k in range(count):
+        if turn(edge, seen[k]) > wp.int64(0):
+            if found < 0:
+                found = k
+            elif met_before(i, edge, seen[k], seen[found]):
+                found = k
+    return found
+
+
+@wp.func
+def sees_all(j: Seen, k: Seen, reach: int, weight: int) -> bool:
+    """Whether no node out of reach can lie in the circle through i, j and k, which has its middle at c.
+
+    Inside are those with |l|² − 2 c·l < w_l − w_i: none for which |l| ≥ 2|c| + w/|l|, with w the largest weight.
+    """
+    x = wp.float64(j.lift) * wp.float64(k.y) - wp.float64(k.lift) * wp.float64(j.y)
+    y = wp.float64(k.lift) * wp.float64(j.x) - wp.float64(j.lift) * wp.float64(k.x)
+    margin = wp.float64(reach) - wp.float64(weight) / wp.float64(reach)
+    return wp.sqrt(x * x + y * y) < wp.float64(turn(j, k)) * margin
+
+
+@forward_kernel
+def wrap(
+    first: int,
+    nodes: wp.array(dtype=wp.int32),
+    grid: wp.uint64,
+    spots: wp.array(dtype=wp.vec3),
+    radius: float,
+    reach: int,
+    weight: int,
+    site: wp.array(dtype=Site),
+    before: wp.array(dtype=wp.int32),
+    stars: Stars,
+):
+    """The stars of some nodes; radius is the reach in the grid, weight the largest one [units²]."""
+    i = nodes[first + wp.tid()]
+    here = site[i]
+    seen = wp.zeros(shape=MOST_SEEN, dtype=Seen)
+    starts = wp.zeros(shape=MOST_EDGES, dtype=Seen)
+    ends = wp.zeros(shape=MOST_EDGES, dtype=Seen)
+    count, edges, fate = int(0), int(0), int(CERTAIN)
+    within = wp.int64(reach) * wp.int64(reach)
+    query = wp.hash_grid_query(grid, spots[i], radius)
+    k = int(0)
+    while wp.hash_grid_query_next(query, k):
+        there = site[k]
+        node = seen_from(here, k, there)
+        distance = square(node.x, node.y)
+        if k != i and distance <= within:
+            if distance == wp.int64(0):
+                fate = COINCIDENT
+            elif count == MOST_SEEN:
+                fate = CROWDED
+            else:
+                seen[count] = node
+                count += 1
+            if there.after != INSIDE:
+                for way in range(2):  # the edge that starts there; and the one that ends there, from out of reach
+                    other = there.after
+                    if wp.static(way == 1):
+                        other = before[k]
+                    end = seen_from(here, other, site[other])
+                    if other != i and (way == 0 or square(end.x, end.y) > within):
+                        if edges == MOST_EDGES:
+                            fate = CROWDED
+                        else:
+                            starts[edges] = node
+                            ends[edges] = end
+                            edges += 1
+    begin, last = int(-1), int(-1)
+    if here.after != INSIDE or edges > 0:
+        after, previous = here.after, before[i]
+        kept = int(0)
+        for m in range(count):
+            node = seen[m]
+            hidden = bool(False)
+            if after != INSIDE:
+                ahead, behind = seen_from(here, after, site[after]), seen_from(here, previous, site[previous])
+                hidden = outside(ahead, behind, node)
+            for e in range(edges):
+                hidden = hidden or hides(starts[e], ends[e], node)
+            if not hidden:
+                seen[kept] = node
+                if node.id == after:
+                    begin = kept
+                if node.id == previous:
+                    last = kept
+                kept += 1
+        count = kept
+    if here.after == INSIDE:
+        begin = nearest(seen, count)
+        last = begin
+    if begin < 0 or last < 0:
+        fate = wp.max(fate, int(OPEN))
+    link = wp.zeros(shape=MOST_NEIGHBOURS, dtype=int)
+    degree, least, j, going = int(0), int(0), begin, fate < OPEN
+    while going:
+        link[degree] = seen[j].id
+        if link[degree] < link[least]:
+            least = degree
+        degree += 1
+        following = next_after(i, j, seen, count)
+        if following < 0:
+            fate = OPEN
+        elif degree == MOST_NEIGHBOURS:
+            fate = CROWDED
+        elif not sees_all(seen[j], seen[following], reach, weight):
+            fate = UNCERTAIN
+        going = fate < OPEN and following != last
+        j = following
+    if here.after != INSIDE and fate < OPEN:  # the last is not the first again
+        link[degree] = seen[last].id
+        degree += 1
+        least = 0
+    if fate >= OPEN:
+        degree = 0
+    for m in range(degree):
+        turned = m + least
+        if turned >= degree:
+            turned -= degree
+        stars.row[i, m] = link[turned]
+    stars.degree[i] = degree
+    stars.fate[i] = fate
