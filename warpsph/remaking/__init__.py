@@ -1,1 +1,1 @@
-"""Cells made anew from the places of nodes (METHOD section 9): state stands at nodes, so nothing is transferred."""
+"""Cells made anew from the places of nodes: state stands at nodes, so nothing is transferred."""

@@ -1,4 +1,4 @@
-"""Which stars are no longer what they should be: a look at a node's own neighbours, and at theirs where they changed."""
+"""Which stars no longer serve: a look at a node's own neighbours, and at the stars of those that changed."""
 
 import warp as wp
 
@@ -30,9 +30,9 @@ def check(
     stars: Stars,
     wanted: wp.array(dtype=wp.int32),
 ):
-    """Want a star anew where a cell has turned over, or a neighbour would no longer be met before the one after it."""
+    """Want a star anew where a cell has turned over, or a neighbour is no longer met before the one after it."""
     i = first + wp.tid()
-    here, degree, bad = site[i], stars.degree[i], bool(False)
+    here, degree, bad = site[i], stars.degree[i], wp.bool(False)
     closed = here.after == INSIDE
     if degree < 2:
         bad = True
@@ -49,11 +49,11 @@ def check(
             far = square(a.x, a.y) > wp.int64(REACH) * wp.int64(REACH)
             bad = bad or far or turn(a, b) <= wp.int64(0)
             if not bad and (closed or m + 2 < degree):
-                l = stars.row[i, (m + 2) % degree]
-                c = seen_from(here, l, site[l])
-                if square(c.x, c.y) > wp.int64(REACH) * wp.int64(REACH):
-                    bad = True
-                elif turn(a, c) > wp.int64(0) and met_before(i, a, c, b):
+                following = stars.row[i, (m + 2) % degree]
+                c = seen_from(here, following, site[following])
+                if square(c.x, c.y) <= wp.int64(REACH) * wp.int64(REACH):
+                    bad = turn(a, c) > wp.int64(0) and met_before(i, a, c, b)
+                else:
                     bad = True
                 a = b
                 b = c
@@ -70,7 +70,7 @@ def follow(
 ):
     """Want the star of a node anew if a cell of it is none of a neighbour's fresh star. Fresh stars are right."""
     i = first + wp.tid()
-    degree, missing = stars.degree[i], bool(False)
+    degree, missing = stars.degree[i], wp.bool(False)
     if fresh[i] == 0:
         cells = degree
         if site[i].after != INSIDE:

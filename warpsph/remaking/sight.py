@@ -37,7 +37,7 @@ def hides(start: Seen, end: Seen, seen: Seen) -> bool:
 
 @wp.func
 def outside(after: Seen, before: Seen, seen: Seen) -> bool:
-    """Whether a node on the outline would see another through what is not the body, from `before` round to `after`."""
+    """Whether a node on the outline would see another between `before` and `after`, where the body is not."""
     if seen.id == after.id or seen.id == before.id:
         return False
     left, right = turn(after, seen) > wp.int64(0), turn(seen, before) > wp.int64(0)

@@ -1,4 +1,4 @@
-"""Nodes in the plane as stars see them: places in whole units, weights, outline; and a grid in which to look around."""
+"""Nodes in the plane as stars see them: places in whole units, weights, outline; and a grid to look around in."""
 
 from functools import cache
 
@@ -9,7 +9,7 @@ from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
 from ..device.precision import Precision
 from .exact import REACH, hash_of
-from .outline import INSIDE, Outline
+from .outline import Outline
 
 FARTHEST = 2**30  # units from the origin, that differences of places are exact
 MOST_CELLS = 2048  # of a hash grid along an axis; beyond it places share cells
@@ -52,9 +52,7 @@ class Sites:
         kernels: all that it launches.
     """
 
-    def __init__(
-        self, outline: Outline, *, reach: float, weight: float, precision: Precision, launcher: Launcher
-    ):
+    def __init__(self, outline: Outline, *, reach: float, weight: float, precision: Precision, launcher: Launcher):
         n, device = len(outline.after), launcher.device
         self.unit, self._launcher, self._snap = reach / REACH, launcher, snap_kernel(precision)
         self.weight = round(weight / self.unit**2)
@@ -70,6 +68,7 @@ class Sites:
 
     def place(self, positions: wp.array) -> None:
         """Snap the nodes' positions [m] to units; they are not moved themselves."""
+        self.far.zero_()
         inputs = [positions, self.unit, self.weight, self.site, self.spots, self.far]
         self._launcher.launch(self._snap, self.site, inputs)
 

@@ -22,7 +22,7 @@ class CellTables:
         launcher: launches the kernels.
 
     Attributes:
-        corners: node indices of each cell, counterclockwise; there is room for 2n cells, which n nodes can not fill.
+        corners: node indices of each cell, counterclockwise; with room for 2n cells, more than there can be.
         node_cells: `NodeCells`, with room.
         cells: how many there are.
         kernels: all that it launches.
@@ -30,9 +30,7 @@ class CellTables:
 
     def __init__(self, n: int, launcher: Launcher):
         self._launcher, self.kernels, device = launcher, (_count, _fill), launcher.device
-        self._owned, self._around, self._first = (
-            wp.zeros(n + 1, dtype=wp.int32, device=device) for _ in range(3)
-        )
+        self._owned, self._around, self._first = (wp.zeros(n + 1, dtype=wp.int32, device=device) for _ in range(3))
         self._lost = wp.zeros(1, dtype=wp.int32, device=device)
         self.corners = wp.zeros((2 * n, 3), dtype=wp.int32, device=device)
         self.node_cells, self.cells = NodeCells(), 0
@@ -40,15 +38,18 @@ class CellTables:
         self.node_cells.place = wp.zeros(6 * n, dtype=wp.int32, device=device)
 
     def fill(self, site: wp.array, stars: Stars) -> bool:
-        """Make the tables; whether each cell was found by its three corners. If not, they are of no use."""
+        """Make the tables; whether each node has cells, and each cell was found by its three corners.
+
+        If not, the tables are of no use.
+        """
         launch, first = self._launcher.launch, self.node_cells.first
-        launch(_count, site, [site, stars, self._owned, self._around])
+        self._lost.zero_()
+        launch(_count, site, [site, stars, self._owned, self._around, self._lost])
         wp.utils.array_scan(self._owned, self._first, inclusive=False)
         wp.utils.array_scan(self._around, first, inclusive=False)
         self.cells, around = int(self._first[-1:].numpy()[0]), int(first[-1:].numpy()[0])
         if around != 3 * self.cells or self.cells > len(self.corners):
             return False
-        self._lost.zero_()
         launch(_fill, site, [site, stars, self._first, self.corners, self.node_cells, self._lost])
         return not self._lost.numpy()[0]
 
@@ -69,10 +70,13 @@ def _count(
     stars: Stars,
     owned: wp.array(dtype=wp.int32),
     around: wp.array(dtype=wp.int32),
+    lost: wp.array(dtype=wp.int32),
 ):
     """Cells that a node owns, and that are around it."""
     i = first + wp.tid()
-    cells, own = _cells_of(i, site, stars), int(0)
+    cells, own = _cells_of(i, site, stars), wp.int32(0)
+    if cells == 0:
+        lost[0] = 1
     for k in range(cells):
         if i < wp.min(stars.row[i, k], stars.row[i, (k + 1) % stars.degree[i]]):
             own += 1
@@ -83,7 +87,7 @@ def _count(
 @wp.func
 def _rank(owner: int, a: int, b: int, site: wp.array(dtype=Site), stars: Stars) -> int:
     """Which of its owner's cells (owner, a, b) is, −1 if none."""
-    rank, degree = int(0), stars.degree[owner]
+    rank, degree = wp.int32(0), stars.degree[owner]
     for k in range(_cells_of(owner, site, stars)):
         p, q = stars.row[owner, k], stars.row[owner, (k + 1) % degree]
         if owner < wp.min(p, q):
@@ -107,10 +111,10 @@ def _fill(
 ):
     """The cells that a node owns, and the places of all that are around it."""
     i = first + wp.tid()
-    degree, rank = stars.degree[i], int(0)
+    degree, rank = stars.degree[i], wp.int32(0)
     for k in range(_cells_of(i, site, stars)):
         a, b = stars.row[i, k], stars.row[i, (k + 1) % degree]
-        place = int(0)
+        place = wp.int32(0)
         if i < wp.min(a, b):
             cell = first_cell[i] + rank
             corners[cell, 0] = i

@@ -1,4 +1,4 @@
-"""The cells of a body in the plane, made from the places of its nodes: all of them, or those that no longer serve."""
+"""The cells of a body in the plane, made from the places of its nodes: all, or those that no longer serve."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .tables import CellTables
 from .wrapping import CERTAIN, MOST_NEIGHBOURS, Stars, wrap
 
 NEAR = 0.67  # of the reach: how far stars look first
-GRID = 0.34  # of the reach: width of the grid's cells
+GRID = 0.67  # of the reach: width of the grid's cells
 ROUNDED = 1.001  # places in the grid are rounded to float32
 
 

@@ -1,9 +1,9 @@
-"""The star of a node, found by itself: its neighbours one after the other, counterclockwise, among the nodes near it.
+"""The star of a node, found by itself: its neighbours one by one, counterclockwise, among the nodes near it.
 
-A star begins with the nearest neighbour, or, of a node on the outline, with the one that follows it there, and ends
-with the one before. Nodes behind an edge of the outline are not seen, so cells never leave the body, and fill it: a
-triangulation of Delaunay under the constraint of the outline. Cells whose circles are within reach are certain. So
-are all, if each is found by its three corners, whatever their circles: `tables` looks.
+A star begins with the nearest node, or, on the outline, with the one that follows there, and ends with the one
+before. Nodes behind an edge of the outline are not seen, so cells never leave the body, and fill it: a triangulation
+of Delaunay under the constraint of the outline. Cells whose circles are within reach are certain. So are all, if
+each is found by its three corners, whatever their circles: `tables` looks.
 """
 
 import warp as wp
@@ -38,8 +38,8 @@ class Stars:
 
 @wp.func
 def nearest(seen: wp.array(dtype=Seen), count: int) -> int:
-    """Number of the nearest node, −1 without any: the one at whose line of equal power, at Λ/2|k|, i ends first."""
-    found, least = int(-1), wp.float64(wp.inf)
+    """Number of the nearest node, −1 without any: the one whose line of equal power, Λ/2|k| away, is."""
+    found, least = wp.int32(-1), wp.float64(wp.inf)
     for k in range(count):
         lift = wp.float64(seen[k].lift)
         distance = lift * wp.abs(lift) / wp.float64(square(seen[k].x, seen[k].y))
@@ -52,12 +52,10 @@ def nearest(seen: wp.array(dtype=Seen), count: int) -> int:
 @wp.func
 def next_after(i: int, j: int, seen: wp.array(dtype=Seen), count: int) -> int:
     """Number of the neighbour that follows j, −1 if none is to the left of it."""
-    edge, found = seen[j], int(-1)
+    edge, found = seen[j], wp.int32(-1)
     for k in range(count):
         if turn(edge, seen[k]) > wp.int64(0):
-            if found < 0:
-                found = k
-            elif met_before(i, edge, seen[k], seen[found]):
+            if found < 0 or met_before(i, edge, seen[k], seen[found]):
                 found = k
     return found
 
@@ -93,10 +91,10 @@ def wrap(
     seen = wp.zeros(shape=MOST_SEEN, dtype=Seen)
     starts = wp.zeros(shape=MOST_EDGES, dtype=Seen)
     ends = wp.zeros(shape=MOST_EDGES, dtype=Seen)
-    count, edges, fate = int(0), int(0), int(CERTAIN)
+    count, edges, fate = wp.int32(0), wp.int32(0), wp.int32(CERTAIN)
     within = wp.int64(reach) * wp.int64(reach)
     query = wp.hash_grid_query(grid, spots[i], radius)
-    k = int(0)
+    k = wp.int32(0)
     while wp.hash_grid_query_next(query, k):
         there = site[k]
         node = seen_from(here, k, there)
@@ -122,13 +120,13 @@ def wrap(
                             starts[edges] = node
                             ends[edges] = end
                             edges += 1
-    begin, last = int(-1), int(-1)
+    begin, last = wp.int32(-1), wp.int32(-1)
     if here.after != INSIDE or edges > 0:
         after, previous = here.after, before[i]
-        kept = int(0)
+        kept = wp.int32(0)
         for m in range(count):
             node = seen[m]
-            hidden = bool(False)
+            hidden = wp.bool(False)
             if after != INSIDE:
                 ahead, behind = seen_from(here, after, site[after]), seen_from(here, previous, site[previous])
                 hidden = outside(ahead, behind, node)
@@ -146,9 +144,9 @@ def wrap(
         begin = nearest(seen, count)
         last = begin
     if begin < 0 or last < 0:
-        fate = wp.max(fate, int(OPEN))
+        fate = wp.max(fate, wp.int32(OPEN))
     link = wp.zeros(shape=MOST_NEIGHBOURS, dtype=int)
-    degree, least, j, going = int(0), int(0), begin, fate < OPEN
+    degree, least, j, going = wp.int32(0), wp.int32(0), begin, fate < OPEN
     while going:
         link[degree] = seen[j].id
         if link[degree] < link[least]:
