@@ -1,7 +1,7 @@
-"""What an interface between a body and a tool carries: nothing, friction, adhesion, the soil's own strength, all.
+"""What an interface between a body and a tool carries: nothing, friction, adhesion, the soil's strength, all.
 
-Pressed together they carry any pressure, and along the surface at most friction times the pressure plus a strength;
-then they slip. What is pulled comes off, unless it is glued.
+Pressed together they carry any pressure, and along the surface at most friction times the pressure plus a
+strength; then they slip. What is pulled comes off, unless it is glued.
 """
 
 from __future__ import annotations

@@ -201,7 +201,7 @@ class Scene:
 
     @cached_property
     def tool_functions(self) -> tuple[tuple[TimeFunction, ...], np.ndarray]:
-        """The distinct functions of time that move the tools, and which of them is whose velocity, shape (k, d)."""
+        """The distinct functions of time that move the tools, and which are each tool's velocity, shape (k, d)."""
         rest = (0.0,) * self.mesh.dim
         velocities = [rest if tool.velocity is None else tool.velocity for tool in self.tools]
         functions: list[TimeFunction] = []
