@@ -6,10 +6,11 @@ from .condition import Condition, Fixed, Free, PrescribedVelocity, Roller, Rotat
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
 from .given_mesh import GivenMesh
+from .interface import Adhesive, Coulomb, Glued, Interface, Rough, Smooth
 from .load import Load, Pressure, Traction
 from .material import Material
 from .numerics import PUBLISHED, SOURCE_SCHEMES, Numerics
-from .output import EdgeForce, NodeValue, Output, Probe, Reaction
+from .output import EdgeForce, NodeValue, Output, Probe, Reaction, ToolForce, ToolImpulse, ToolTorque
 from .parameter import Parameter
 from .registry import KERNELS, MATERIALS, register
 from .resolve import BoundaryTable
@@ -18,6 +19,7 @@ from .scheme import SCHEMES, Scheme
 from .selection import edge, everywhere, region, tag, where
 from .shape import Box, Disc, Mapped, Polygon, Shape
 from .smoothing import SmoothingKernel
+from .tool import Block, Cylinder, Plane, Sphere, Tool
 
 __all__ = [
     "BAR",
@@ -29,18 +31,24 @@ __all__ = [
     "SCHEMES",
     "SOLID",
     "SOURCE_SCHEMES",
+    "Adhesive",
+    "Block",
     "BodyForce",
     "BoundaryTable",
     "Box",
     "Check",
     "Condition",
     "Continuum",
+    "Coulomb",
+    "Cylinder",
     "Disc",
     "EdgeForce",
     "Fixed",
     "Free",
     "FreeSurface",
     "GivenMesh",
+    "Glued",
+    "Interface",
     "Linear",
     "Load",
     "Mapped",
@@ -49,6 +57,7 @@ __all__ = [
     "Numerics",
     "Output",
     "Parameter",
+    "Plane",
     "Polygon",
     "PrescribedVelocity",
     "Pressure",
@@ -58,11 +67,18 @@ __all__ = [
     "Reaction",
     "Roller",
     "Rotating",
+    "Rough",
     "Scene",
     "Scheme",
     "Shape",
+    "Smooth",
     "SmoothingKernel",
+    "Sphere",
     "Table",
+    "Tool",
+    "ToolForce",
+    "ToolImpulse",
+    "ToolTorque",
     "Traction",
     "edge",
     "everywhere",
