@@ -13,6 +13,7 @@ from .numerics import PUBLISHED, SOURCE_SCHEMES, Numerics
 from .output import EdgeForce, NodeValue, Output, Probe, Reaction, ToolForce, ToolImpulse, ToolTorque
 from .parameter import Parameter
 from .registry import KERNELS, MATERIALS, register
+from .remade import Remade
 from .resolve import BoundaryTable
 from .scene import BodyForce, Scene
 from .scheme import SCHEMES, Scheme
@@ -65,6 +66,7 @@ __all__ = [
     "Pulse",
     "Ramp",
     "Reaction",
+    "Remade",
     "Roller",
     "Rotating",
     "Rough",

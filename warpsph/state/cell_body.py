@@ -1,20 +1,21 @@
 """A body of the scheme `cells` on a device: its nodes, and what a pass over the cells leaves of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
+from ..mesh.mesh import Mesh
 from ..physics.space import Space
 from ..scene.scene import Scene
 from .body import Body, shared_parts
 from .cells import NodeCells, cell_table, has_slots, node_cells
 
 # Rows of the nodes' books, energies [J]: work of the body force and of conditions on velocities; what damping,
-# elastic strain and flow took.
-ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW = tuple(range(5))
+# elastic strain, flow and cells that were made anew took.
+ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW, REMADE = tuple(range(6))
 LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
@@ -102,7 +103,7 @@ class CellBody(Body):
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
         nodes.books = wp.zeros((len(ENTRIES), n), dtype=wp.float64, device=device)
-        shared, slots = shared_parts(scene, space, launcher), has_slots(mesh)
+        shared, slots = shared_parts(scene, space, launcher), has_slots(mesh) and scene.cells is None
         nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
         nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)
         table, rigid = node_cells(mesh, slots, device), scene.rigid_cells
@@ -116,9 +117,17 @@ class CellBody(Body):
             **shared,
         )
 
+    def mesh(self) -> Mesh:
+        """The nodes at the start, and the cells as they are now; without its boundary where those were made anew."""
+        mesh = self.scene.mesh
+        if self.scene.cells is None:
+            return mesh
+        cells = self.corners.numpy()[self.cell_mass.numpy() > 0.0]
+        return replace(mesh, cells=cells)
+
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,): m over the volume of their cells as they are now."""
-        mesh = self.scene.mesh
+        mesh = self.mesh()
         if self.scene.large_displacements:
             mesh = mesh.with_nodes(mesh.nodes + self.nodes.displacement.numpy())
         return self.nodes.mass.numpy() / mesh.node_volumes()[0]

@@ -18,7 +18,9 @@ from ..operators.cell_passes import corner_share, force_kernel, strain_kernel
 from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
+from ..operators.node_limit import NodeLimit
 from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
+from ..operators.remaking import Remaking
 from ..operators.sharpening import Sharpening
 from ..operators.tools import Tools
 from ..physics.space import Space
@@ -43,6 +45,7 @@ class CellStepper(Stepper):
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
+        remaking: makes cells anew.
         tools: the tools, what they do to the body, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
     """
@@ -66,7 +69,8 @@ class CellStepper(Stepper):
         self.loads = LoadedFaces(body, clock, len(driven))
         offset = len(driven) + len(scene.loads.functions)
         self.tools = Tools(body, clock, offset, self.conditions)
-        self._limit = CellLimit(body, clock)
+        self.remaking = remaking = Remaking(body, clock)
+        self._limit = (NodeLimit if remaking.on else CellLimit)(body, clock)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work, tools=self.tools.work)
         kind, slots, share = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
@@ -77,8 +81,8 @@ class CellStepper(Stepper):
         self._force = force_kernel(space, kind, body.law, sharpening.on)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
-        super().__init__(launcher, clock, parts=(self._limit,))
-        for part in (clock, sharpening, self.loads, self.tools, self._limit, self._energy):
+        super().__init__(launcher, clock, parts=(remaking, self._limit) if remaking.on else (self._limit,))
+        for part in (clock, sharpening, self.loads, self.tools, remaking, self._limit, self._energy):
             kernels += part.kernels
         load_kernels(kernels, device)
         self._limit.refresh()
@@ -123,6 +127,7 @@ class CellStepper(Stepper):
         inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         self.tools.settle()
+        self.remaking.count()
         clock.tick()
 
     def _rates(self) -> None:

@@ -1,0 +1,238 @@
+"""Cells of a body that are made anew as it flows, see `warpsph.scene.remade` and `warpsph.remaking`."""
+
+from functools import cache
+
+import warp as wp
+
+from ..device.compiling import forward_kernel
+from ..mesh.kinds import CellKind
+from ..physics.space import Space
+from ..remaking.outline import outline_of
+from ..remaking.tables import CellTables
+from ..remaking.triangulation import Triangulation
+from ..state.cell_body import ELASTIC, REMADE, CellBody, cell_node_types, enter
+from ..state.cells import NodeCells, corner_place
+from ..state.clock import Clock
+from .cell_shape import cell_shape
+
+SEEN = 4.0  # spacings: how far a star sees
+# Of Δx²: the largest weight of a node. Cells of a lattice that turns change by rounding without.
+WEIGHT = 5e-3
+# Cells are made anew from the moment on when one has lost so much of A/Σl², its area over the squares of its edges.
+WORN = 0.4
+
+
+class Remaking:
+    """A `Part`: cells, made anew; without any asked for it does nothing.
+
+    Args:
+        body: the body in its initial state; its arrays of cells are written.
+        clock: gives the flag that says that it is time to look.
+
+    Attributes:
+        on: whether it was asked for.
+        begun: whether cells have been made anew yet.
+        made, refused: how often they were, and how often they could not be, since the outline crosses itself.
+        kernels: all that it launches.
+    """
+
+    def __init__(self, body: CellBody, clock: Clock):
+        scene, space, launcher = body.scene, body.space, body.launcher
+        self._body, self.on, self.kernels = body, scene.cells is not None, ()
+        self.begun, self.made, self.refused = False, 0, 0
+        if not self.on:
+            return
+        n, device, spacing = body.nodes.mass.shape[0], launcher.device, scene.mesh.spacing
+        self.outdated, self._every = clock.new_flag(), scene.cells.every
+        self._steps = wp.zeros(1, dtype=wp.int32, device=device)
+        self._positions = wp.zeros(n, dtype=space.types.vector, device=device)
+        self._volume = wp.zeros(n, dtype=space.real, device=device)
+        self._shape = wp.zeros(body.corners.shape[0], dtype=space.real, device=device)
+        self._worn = wp.zeros(1, dtype=wp.int32, device=device)
+        self._triangulation = Triangulation(
+            outline_of(scene.mesh),
+            reach=SEEN * spacing,
+            weight=WEIGHT * spacing**2,
+            precision=space.precision,
+            launcher=launcher,
+        )
+        self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
+        self._measure, self._install = _volume_kernel(space, body.kind), _install_kernel(space, body.kind)
+        self._book = _book_kernel(space, body.law)
+        self.kernels = (_count, self._positions_of, self._wear, self._measure, self._install, self._book)
+        self.kernels += self._triangulation.kernels
+        body.launcher.launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
+
+    def count(self) -> None:
+        """Count a step."""
+        if self.on:
+            self._body.launcher.launch(_count, self._steps, [self._every, self._steps, self.outdated])
+
+    def refresh(self) -> None:
+        """Look at the cells, and make anew those that no longer serve."""
+        body, launch = self._body, self._body.launcher.launch
+        self._steps.zero_()
+        self.outdated.zero_()
+        if not self.begun:
+            launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
+            self.begun = bool(self._worn.numpy()[0])
+            if not self.begun:
+                return
+        launch(self._positions_of, self._positions, [body.nodes, self._positions])
+        triangulation = self._triangulation
+        if not triangulation.renew(self._positions):
+            self.refused += 1
+        elif triangulation.wrapped:
+            self.made += 1
+            self._replace(triangulation.tables)
+
+    def _replace(self, tables: CellTables) -> None:
+        """Put new cells in place."""
+        body, launch = self._body, self._body.launcher.launch
+        nodes, table = body.nodes, body.node_cells
+        launch(self._measure, self._volume, [body.corners, table, nodes, self._volume])
+        launch(self._book, self._volume, [body.parameters, self._volume, wp.float64(1.0), nodes])
+        wp.copy(table.first, tables.node_cells.first)
+        wp.copy(table.place, tables.node_cells.place, count=3 * tables.cells)
+        launch(self._measure, self._volume, [tables.corners, table, nodes, self._volume])
+        launch(self._book, self._volume, [body.parameters, self._volume, wp.float64(-1.0), nodes])
+        inputs = [tables.cells, tables.corners, nodes, self._volume, body.corners, body.cell_mass]
+        launch(self._install, body.cell_mass, inputs)
+
+
+@forward_kernel
+def _count(first: int, every: int, steps: wp.array(dtype=wp.int32), outdated: wp.array(dtype=wp.int32)):
+    steps[0] = steps[0] + 1
+    if steps[0] >= every:
+        outdated[0] = 1
+
+
+@cache
+def _positions_kernel(space: Space):
+    CellNodes = cell_node_types(space)[1]
+
+    @forward_kernel
+    def positions(first: int, nodes: CellNodes, result: wp.array(dtype=space.types.vector)):
+        i = first + wp.tid()
+        result[i] = nodes.point[i].x
+
+    return positions
+
+
+@cache
+def _area(space: Space, kind: CellKind):
+    """(cell, corners, nodes) → its modes B, its area."""
+    shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
+    T = shape.weights
+
+    @wp.func
+    def area(c: int, corners: wp.array2d(dtype=wp.int32), nodes: CellNodes):
+        x = shape.Modes()
+        for k in range(wp.static(kind.corners)):
+            x += wp.outer(T[k], nodes.point[corners[c, k]].x)
+        _, volume, _ = shape.measure(x)
+        return volume
+
+    return area
+
+
+@cache
+def _wear_kernel(space: Space, kind: CellKind):
+    """Raise a flag where a cell has lost too much of its shape; where none is stored yet, store it."""
+    real, CellNodes, area = space.real, cell_node_types(space)[1], _area(space, kind)
+
+    @forward_kernel
+    def wear(
+        first: int,
+        corners: wp.array2d(dtype=wp.int32),
+        nodes: CellNodes,
+        shape: wp.array(dtype=real),
+        worn: wp.array(dtype=wp.int32),
+    ):
+        c = first + wp.tid()
+        edges = real(0.0)
+        for k in range(wp.static(kind.corners)):
+            end = nodes.point[corners[c, (k + 1) % wp.static(kind.corners)]].x
+            edges += wp.length_sq(nodes.point[corners[c, k]].x - end)
+        now = area(c, corners, nodes) / edges
+        if shape[c] == real(0.0):
+            shape[c] = now
+        elif now < real(wp.static(1.0 - WORN)) * shape[c]:
+            worn[0] = 1
+
+    return wear
+
+
+@cache
+def _volume_kernel(space: Space, kind: CellKind):
+    """Σ A_T/n of each node."""
+    real, CellNodes, area, place_of = space.real, cell_node_types(space)[1], _area(space, kind), corner_place(kind)
+    per_corner = 1.0 / kind.corners
+
+    @forward_kernel
+    def volumes(
+        first: int,
+        corners: wp.array2d(dtype=wp.int32),
+        table: NodeCells,
+        nodes: CellNodes,
+        result: wp.array(dtype=real),
+    ):
+        i = first + wp.tid()
+        total = real(0.0)
+        for entry in range(table.first[i], table.first[i + 1]):
+            c, _ = place_of(entry, table)
+            total += area(c, corners, nodes)
+        result[i] = real(per_corner) * total
+
+    return volumes
+
+
+@cache
+def _book_kernel(space: Space, law):
+    """Move the elastic energy of volumes, times a sign, from what stays elastic to what re-making takes."""
+    real, CellNodes = space.real, cell_node_types(space)[1]
+
+    @forward_kernel
+    def book(
+        first: int,
+        material: law.Parameters,
+        volume: wp.array(dtype=real),
+        sign: wp.float64,
+        nodes: CellNodes,
+    ):
+        i = first + wp.tid()
+        sigma = space.phi.stress(nodes.point[i].phi)
+        twice = space.stress.complementary(sigma, sigma, material.lame, material.shear, material.young)
+        energy = sign * wp.float64(real(0.5) * volume[i] * twice)
+        enter(REMADE, i, energy, nodes.books)
+        enter(ELASTIC, i, -energy, nodes.books)
+
+    return book
+
+
+@cache
+def _install_kernel(space: Space, kind: CellKind):
+    """Corners and masses of the new cells: no corner has more mass than its node. What is left over loses none."""
+    real, CellNodes, area = space.real, cell_node_types(space)[1], _area(space, kind)
+
+    @forward_kernel
+    def install(
+        first: int,
+        cells: int,
+        made: wp.array2d(dtype=wp.int32),
+        nodes: CellNodes,
+        volume: wp.array(dtype=real),
+        corners: wp.array2d(dtype=wp.int32),
+        cell_mass: wp.array(dtype=real),
+    ):
+        c = first + wp.tid()
+        source = wp.min(c, cells - 1)
+        density = real(wp.inf)
+        for k in range(wp.static(kind.corners)):
+            i = made[source, k]
+            corners[c, k] = i
+            density = wp.min(density, nodes.mass[i] / volume[i])
+        mass = density * area(source, made, nodes)
+        cell_mass[c] = wp.where(c < cells, mass, real(0.0))
+
+    return install
