@@ -31,6 +31,7 @@ class Remaking:
 
     Attributes:
         on: whether it was asked for.
+        outline: `OutlineArrays`, or None.
         begun: whether cells have been made anew yet.
         made, refused: how often they were, and how often they could not be, since the outline crosses itself.
         kernels: all that it launches.
@@ -39,7 +40,7 @@ class Remaking:
     def __init__(self, body: CellBody, clock: Clock):
         scene, space, launcher = body.scene, body.space, body.launcher
         self._body, self.on, self.kernels = body, scene.cells is not None, ()
-        self.begun, self.made, self.refused = False, 0, 0
+        self.begun, self.made, self.refused, self.outline = False, 0, 0, None
         if not self.on:
             return
         n, device, spacing = body.nodes.mass.shape[0], launcher.device, scene.mesh.spacing
@@ -56,10 +57,11 @@ class Remaking:
             precision=space.precision,
             launcher=launcher,
         )
+        self.outline = self._triangulation.outline
         self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
         self._measure, self._install = _volume_kernel(space, body.kind), _install_kernel(space, body.kind)
-        self._book = _book_kernel(space, body.law)
-        self.kernels = (_count, self._positions_of, self._wear, self._measure, self._install, self._book)
+        self._book, self._move = _book_kernel(space, body.law), _move_kernel(space)
+        self.kernels = (_count, self._positions_of, self._wear, self._measure, self._install, self._book, self._move)
         self.kernels += self._triangulation.kernels
         body.launcher.launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
 
@@ -70,7 +72,7 @@ class Remaking:
 
     def refresh(self) -> None:
         """Look at the cells, and make anew those that no longer serve."""
-        body, launch = self._body, self._body.launcher.launch
+        body, nodes, launch = self._body, self._body.nodes, self._body.launcher.launch
         self._steps.zero_()
         self.outdated.zero_()
         if not self.begun:
@@ -80,6 +82,8 @@ class Remaking:
                 return
         launch(self._positions_of, self._positions, [body.nodes, self._positions])
         triangulation = self._triangulation
+        triangulation.peel(self._positions)
+        launch(self._move, self._positions, [self._positions, nodes])
         if not triangulation.renew(self._positions):
             self.refused += 1
         elif triangulation.wrapped:
@@ -117,6 +121,23 @@ def _positions_kernel(space: Space):
         result[i] = nodes.point[i].x
 
     return positions
+
+
+@cache
+def _move_kernel(space: Space):
+    """Put nodes where they were moved to; all others stay where they are."""
+    CellNodes, vector = cell_node_types(space)[1], space.types.vector
+
+    @forward_kernel
+    def move(first: int, positions: wp.array(dtype=vector), nodes: CellNodes):
+        i = first + wp.tid()
+        shift = positions[i] - nodes.point[i].x
+        if wp.length_sq(shift) > space.real(0.0):
+            u = nodes.displacement[i] + shift
+            nodes.displacement[i] = u
+            nodes.point[i].x = nodes.reference[i] + u
+
+    return move
 
 
 @cache

@@ -22,6 +22,7 @@ from ..state.cell_body import CellBody
 from ..state.clock import Clock
 from .contact import contact_kernel, contact_types
 from .face_shares import FaceShares
+from .outline_shares import OutlineShares
 from .tool_forms import exact_vector, move_kernel, tool_table
 
 SWEEPS = 4  # over the tools, where there are several
@@ -35,6 +36,7 @@ class Tools:
         clock: drives them.
         offset: where their functions of time begin among the clock's.
         held: the table of the conditions.
+        outline: `OutlineArrays` where it changes, or None.
 
     Attributes:
         work: done by the tools on the body [J], a number a node of the boundary.
@@ -45,10 +47,11 @@ class Tools:
         SceneError: a rough tool, and the material's law does not say how strong it is.
     """
 
-    def __init__(self, body: CellBody, clock: Clock, offset: int, held):
+    def __init__(self, body: CellBody, clock: Clock, offset: int, held, outline=None):
         scene, space, device = body.scene, body.space, body.launcher.device
         self._body, self._clock, self._held = body, clock, held
-        nodes = np.unique(scene.mesh.faces) if scene.tools else np.zeros(0, dtype=np.int64)
+        nodes = np.unique(scene.mesh.faces) if outline is None else np.arange(len(scene.mesh.nodes))
+        nodes = nodes if scene.tools else np.zeros(0, dtype=np.int64)
         rows, count, vector = len(nodes), len(scene.tools), space.types.vector
         self._any, self._table = count > 0, tool_table(scene, space, device, offset)
         self._contacts = contacts = contact_types(space)()
@@ -62,7 +65,9 @@ class Tools:
         self._internals, spare = body.internals, wp.zeros(1, dtype=vector, device=device)
         if self._internals is None:
             self._internals = wp.zeros(1, dtype=space.vec(1), device=device)
-        self._shares = FaceShares(body, nodes) if _strong(body) else None
+        self._shares = None
+        if _strong(body):
+            self._shares = FaceShares(body, nodes) if outline is None else OutlineShares(body, outline)
         self._areas = spare if self._shares is None else self._shares.vectors
         self.kernels = ()
         if self._any:

@@ -1,10 +1,9 @@
 """A body's outline as material edges: which node is next to a node along it, with the body to the left."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
+import warp as wp
 
 from ..errors import SceneError
 from ..mesh.mesh import Mesh
@@ -23,6 +22,22 @@ class Outline(NamedTuple):
 
     after: np.ndarray
     before: np.ndarray
+
+
+@wp.struct
+class OutlineArrays:
+    """An `Outline` on a device."""
+
+    after: wp.array(dtype=wp.int32)
+    before: wp.array(dtype=wp.int32)
+
+
+def outline_arrays(outline: Outline, device: wp.Device) -> OutlineArrays:
+    """The outline on a device."""
+    arrays = OutlineArrays()
+    arrays.after = wp.array(outline.after, dtype=wp.int32, device=device)
+    arrays.before = wp.array(outline.before, dtype=wp.int32, device=device)
+    return arrays
 
 
 def outline_of(mesh: Mesh) -> Outline:

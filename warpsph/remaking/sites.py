@@ -2,14 +2,13 @@
 
 from functools import cache
 
-import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
 from ..device.precision import Precision
 from .exact import REACH, hash_of
-from .outline import Outline
+from .outline import Outline, outline_arrays
 
 FARTHEST = 2**30  # units from the origin, that differences of places are exact
 MOST_CELLS = 2048  # of a hash grid along an axis; beyond it places share cells
@@ -45,7 +44,7 @@ class Sites:
         unit: length of a unit [m].
         weight: the largest weight [units²].
         site: `Site` of each node.
-        before: the node that it follows along the outline, or `INSIDE`.
+        outline: `OutlineArrays`, which may change between two calls of `place`.
         far: 1 where a node is too far from the origin for its place to be a number of units.
         grid: the hash grid of the nodes.
         spots: their places in it [reach].
@@ -56,10 +55,8 @@ class Sites:
         n, device = len(outline.after), launcher.device
         self.unit, self._launcher, self._snap = reach / REACH, launcher, snap_kernel(precision)
         self.weight = round(weight / self.unit**2)
-        sites = np.zeros(n, dtype=Site.numpy_dtype())
-        sites["after"] = outline.after
-        self.site = wp.array(sites, dtype=Site, device=device)
-        self.before = wp.array(outline.before, dtype=wp.int32, device=device)
+        self.site = wp.zeros(n, dtype=Site, device=device)
+        self.outline = outline_arrays(outline, device)
         self.spots = wp.zeros(n, dtype=wp.vec3, device=device)
         self.far = wp.zeros(1, dtype=wp.int32, device=device)
         side = min(MOST_CELLS, max(8, 2 * round(n**0.5)))
@@ -69,7 +66,7 @@ class Sites:
     def place(self, positions: wp.array) -> None:
         """Snap the nodes' positions [m] to units; they are not moved themselves."""
         self.far.zero_()
-        inputs = [positions, self.unit, self.weight, self.site, self.spots, self.far]
+        inputs = [positions, self.outline.after, self.unit, self.weight, self.site, self.spots, self.far]
         self._launcher.launch(self._snap, self.site, inputs)
 
     def sort(self, width: float) -> None:
@@ -86,6 +83,7 @@ def snap_kernel(precision: Precision):
     def snap(
         first: int,
         positions: wp.array(dtype=vector),
+        after: wp.array(dtype=wp.int32),
         unit: wp.float64,
         weight: int,
         site: wp.array(dtype=Site),
@@ -98,7 +96,8 @@ def snap_kernel(precision: Precision):
         if not wp.max(wp.abs(x), wp.abs(y)) < wp.float64(farthest):
             far[0] = 1
             return
-        here = site[i]
+        here = Site()
+        here.after = after[i]
         here.x = int(x)
         here.y = int(y)
         here.weight = int((wp.uint64(hash_of(i)) * wp.uint64(weight)) >> wp.uint64(32))

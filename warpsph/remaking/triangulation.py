@@ -11,6 +11,7 @@ from .checking import check, follow
 from .chosen import Chosen
 from .exact import REACH
 from .outline import Outline
+from .peeling import Peeling
 from .sites import Sites
 from .tables import CellTables
 from .wrapping import CERTAIN, MOST_NEIGHBOURS, Stars, wrap
@@ -31,6 +32,7 @@ class Triangulation:
         launcher: launches the kernels.
 
     Attributes:
+        outline: `OutlineArrays`, the outline as it is.
         tables: the cells, and those around each node.
         wrapped: how many stars were wrapped when it was last made or renewed.
         kernels: all that it launches.
@@ -47,7 +49,8 @@ class Triangulation:
             wp.zeros(n, dtype=wp.int32, device=device) for _ in range(3)
         )
         self._stars.row = wp.zeros((n, MOST_NEIGHBOURS), dtype=wp.int32, device=device)
-        parts = (self._sites, self._chosen, self.tables)
+        self.outline, self._peeling = self._sites.outline, Peeling(n, precision, launcher)
+        parts = (self._sites, self._chosen, self.tables, self._peeling)
         self.kernels = (wrap, check, follow, _look_farther, *(kernel for part in parts for kernel in part.kernels))
 
     def make(self, positions: wp.array) -> bool:
@@ -71,11 +74,16 @@ class Triangulation:
             return self.make(positions)
         self._place(positions)
         launch, site, stars = self._launcher.launch, self._sites.site, self._stars
-        launch(check, site, [site, self._sites.before, stars, self._chosen.flags])
+        launch(check, site, [site, self._sites.outline.before, stars, self._chosen.flags])
         while (nodes := self._chosen.nodes()) is not None:
             self._wrap(nodes)
             launch(follow, site, [site, self._fresh, stars, self._chosen.flags])
         return self._fill() if self.wrapped else True
+
+    def peel(self, positions: wp.array) -> None:
+        """Take nodes that have come to the outline onto it [m], before cells are renewed; see `peeling`."""
+        if self._sound:
+            self._peeling.peel(positions, self._stars, self.outline)
 
     def _place(self, positions: wp.array) -> None:
         self._sites.place(positions)
@@ -90,7 +98,7 @@ class Triangulation:
             self._sorted = True
         for share in (NEAR, 1.0):
             inputs = [nodes, sites.grid.id, sites.spots, share * ROUNDED, int(share * REACH), sites.weight]
-            self._launcher.launch(wrap, nodes, [*inputs, sites.site, sites.before, self._stars])
+            self._launcher.launch(wrap, nodes, [*inputs, sites.site, sites.outline.before, self._stars])
             inputs = [self._stars.fate, self._fresh, self._chosen.flags]
             self._launcher.launch(_look_farther, self._chosen.flags, inputs)
             if (nodes := self._chosen.nodes()) is None:
