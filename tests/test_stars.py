@@ -76,6 +76,7 @@ def triangulation(mesh, device="cpu", threads=1, precision="float64", reach=SEEN
     launcher = Launcher(wp.get_device(device), threads)
     return Triangulation(
         outline or outline_of(mesh),
+        near=2.0,
         reach=reach,
         weight=weight,
         precision=PRECISIONS[precision],
@@ -334,4 +335,4 @@ def test_all_kernels_compile_for_cuda(tmp_path):
     modules = {kernel.module for kernel in triangulation(lattice(3, 3)).kernels}
     for module in modules:
         wp.compile_aot_module(module, arch=HOPPER, module_dir=tmp_path, use_ptx=False)
-    assert len(list(tmp_path.glob("*.cubin"))) == len(modules) == 8
+    assert len(list(tmp_path.glob("*.cubin"))) == len(modules) == 11

@@ -15,7 +15,7 @@ from ..state.cells import NodeCells, corner_place
 from ..state.clock import Clock
 from .cell_shape import cell_shape
 
-SEEN = 4.0  # spacings: how far a star sees
+NEAR, SEEN = 2.0, 6.0  # spacings: how far a star looks first, and at all
 # Of Δx²: the largest weight of a node. Cells of a lattice that turns change by rounding without.
 WEIGHT = 5e-3
 # Cells are made anew from the moment on when one has lost so much of A/Σl², its area over the squares of its edges.
@@ -52,6 +52,7 @@ class Remaking:
         self._worn = wp.zeros(1, dtype=wp.int32, device=device)
         self._triangulation = Triangulation(
             outline_of(scene.mesh),
+            near=NEAR * spacing,
             reach=SEEN * spacing,
             weight=WEIGHT * spacing**2,
             precision=space.precision,
@@ -61,7 +62,15 @@ class Remaking:
         self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
         self._measure, self._install = _volume_kernel(space, body.kind), _install_kernel(space, body.kind)
         self._book, self._move = _book_kernel(space, body.law), _move_kernel(space)
-        self.kernels = (_count, self._positions_of, self._wear, self._measure, self._install, self._book, self._move)
+        self.kernels = (
+            _count,
+            self._positions_of,
+            self._wear,
+            self._measure,
+            self._install,
+            self._book,
+            self._move,
+        )
         self.kernels += self._triangulation.kernels
         body.launcher.launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
 

@@ -14,7 +14,7 @@ from ..device.precision import Precision
 from .outline import INSIDE, OutlineArrays
 from .wrapping import Stars
 
-STRAIGHT = 0.0875  # tangent of what an angle lacks to 180 degrees: 5 degrees
+STRAIGHT = 0.27  # tangent of what an angle lacks to 180 degrees: 5 degrees
 
 
 class Peeling:

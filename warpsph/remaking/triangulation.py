@@ -14,10 +14,9 @@ from .outline import Outline
 from .peeling import Peeling
 from .sites import Sites
 from .tables import CellTables
-from .wrapping import CERTAIN, MOST_NEIGHBOURS, Stars, wrap
+from .wrapping import CERTAIN, MOST_NEIGHBOURS, Stars, wrap_kernel
 
-NEAR = 0.67  # of the reach: how far stars look first
-GRID = 0.67  # of the reach: width of the grid's cells
+MOST_NEAR, MOST_FAR = (64, 48), (256, 96)  # nodes, and edges of the outline, that a star sees near, and in all
 ROUNDED = 1.001  # places in the grid are rounded to float32
 
 
@@ -26,7 +25,8 @@ class Triangulation:
 
     Args:
         outline: the outline of the body.
-        reach: how far a star sees [m]; three spacings serve where nodes are spread evenly.
+        near: how far a star looks first [m]: two spacings.
+        reach: how far it sees [m]; three spacings serve where nodes are spread evenly.
         weight: the largest weight of a node [m²]: with it cells of a lattice that turns stay what they are.
         precision: of the positions.
         launcher: launches the kernels.
@@ -39,10 +39,18 @@ class Triangulation:
     """
 
     def __init__(
-        self, outline: Outline, *, reach: float, weight: float = 0.0, precision: Precision, launcher: Launcher
+        self,
+        outline: Outline,
+        *,
+        near: float,
+        reach: float,
+        weight: float = 0.0,
+        precision: Precision,
+        launcher: Launcher,
     ):
         n, device = len(outline.after), launcher.device
-        self._launcher, self.wrapped, self._sound = launcher, 0, False
+        self._launcher, self.wrapped, self._sound, self._near = launcher, 0, False, near / reach
+        self._looks = ((self._near, wrap_kernel(*MOST_NEAR)), (1.0, wrap_kernel(*MOST_FAR)))
         self._sites = Sites(outline, reach=reach, weight=weight, precision=precision, launcher=launcher)
         self._chosen, self.tables, self._stars = Chosen(n, launcher), CellTables(n, launcher), Stars()
         self._stars.degree, self._stars.fate, self._fresh = (
@@ -51,7 +59,8 @@ class Triangulation:
         self._stars.row = wp.zeros((n, MOST_NEIGHBOURS), dtype=wp.int32, device=device)
         self.outline, self._peeling = self._sites.outline, Peeling(n, precision, launcher)
         parts = (self._sites, self._chosen, self.tables, self._peeling)
-        self.kernels = (wrap, check, follow, _look_farther, *(kernel for part in parts for kernel in part.kernels))
+        self.kernels = (check, follow, _look_farther, *(kernel for _, kernel in self._looks))
+        self.kernels += tuple(kernel for part in parts for kernel in part.kernels)
 
     def make(self, positions: wp.array) -> bool:
         """Make all cells anew.
@@ -94,9 +103,9 @@ class Triangulation:
         """Wrap the stars of some nodes, which are flagged, those that may not be certain with a longer reach."""
         sites, self.wrapped = self._sites, self.wrapped + len(nodes)
         if not self._sorted:
-            sites.sort(GRID)
+            sites.sort(self._near)
             self._sorted = True
-        for share in (NEAR, 1.0):
+        for share, wrap in self._looks:
             inputs = [nodes, sites.grid.id, sites.spots, share * ROUNDED, int(share * REACH), sites.weight]
             self._launcher.launch(wrap, nodes, [*inputs, sites.site, sites.outline.before, self._stars])
             inputs = [self._stars.fate, self._fresh, self._chosen.flags]

@@ -6,6 +6,8 @@ of Delaunay under the constraint of the outline. Cells whose circles are within 
 each is found by its three corners, whatever their circles: `tables` looks.
 """
 
+from functools import cache
+
 import warp as wp
 
 from ..device.compiling import forward_kernel
@@ -14,8 +16,7 @@ from .outline import INSIDE
 from .sight import hides, outside, seen_from
 from .sites import Site
 
-# The most nodes that a star sees, edges of the outline that it sees, and neighbours that it has.
-MOST_SEEN, MOST_EDGES, MOST_NEIGHBOURS = 96, 48, 24
+MOST_NEIGHBOURS = 24  # that a star has
 # What became of a star.
 CERTAIN, UNCERTAIN, OPEN, CROWDED, COINCIDENT = 0, 1, 2, 3, 4
 
@@ -72,105 +73,113 @@ def sees_all(j: Seen, k: Seen, reach: int, weight: int) -> bool:
     return wp.sqrt(x * x + y * y) < wp.float64(turn(j, k)) * margin
 
 
-@forward_kernel
-def wrap(
-    first: int,
-    nodes: wp.array(dtype=wp.int32),
-    grid: wp.uint64,
-    spots: wp.array(dtype=wp.vec3),
-    radius: float,
-    reach: int,
-    weight: int,
-    site: wp.array(dtype=Site),
-    before: wp.array(dtype=wp.int32),
-    stars: Stars,
-):
-    """The stars of some nodes; radius is the reach in the grid, weight the largest one [units²]."""
-    i = nodes[first + wp.tid()]
-    here = site[i]
-    seen = wp.zeros(shape=MOST_SEEN, dtype=Seen)
-    starts = wp.zeros(shape=MOST_EDGES, dtype=Seen)
-    ends = wp.zeros(shape=MOST_EDGES, dtype=Seen)
-    count, edges, fate = wp.int32(0), wp.int32(0), wp.int32(CERTAIN)
-    within = wp.int64(reach) * wp.int64(reach)
-    query = wp.hash_grid_query(grid, spots[i], radius)
-    k = wp.int32(0)
-    while wp.hash_grid_query_next(query, k):
-        there = site[k]
-        node = seen_from(here, k, there)
-        distance = square(node.x, node.y)
-        if k != i and distance <= within:
-            if distance == wp.int64(0):
-                fate = COINCIDENT
-            elif count == MOST_SEEN:
+@cache
+def wrap_kernel(most_seen: int, most_edges: int):
+    """The stars of some nodes, each of which sees so many nodes, and edges of the outline, at most."""
+
+    @forward_kernel
+    def wrap(
+        first: int,
+        nodes: wp.array(dtype=wp.int32),
+        grid: wp.uint64,
+        spots: wp.array(dtype=wp.vec3),
+        radius: float,
+        reach: int,
+        weight: int,
+        site: wp.array(dtype=Site),
+        before: wp.array(dtype=wp.int32),
+        stars: Stars,
+    ):
+        # radius: the reach in the grid; weight: the largest one [units²]
+        i = nodes[first + wp.tid()]
+        here = site[i]
+        seen = wp.zeros(shape=most_seen, dtype=Seen)
+        starts = wp.zeros(shape=most_edges, dtype=Seen)
+        ends = wp.zeros(shape=most_edges, dtype=Seen)
+        count, edges, fate = wp.int32(0), wp.int32(0), wp.int32(CERTAIN)
+        within = wp.int64(reach) * wp.int64(reach)
+        query = wp.hash_grid_query(grid, spots[i], radius)
+        k = wp.int32(0)
+        while wp.hash_grid_query_next(query, k):
+            there = site[k]
+            node = seen_from(here, k, there)
+            distance = square(node.x, node.y)
+            if k != i and distance <= within:
+                if distance == wp.int64(0):
+                    fate = COINCIDENT
+                elif count == most_seen:
+                    fate = CROWDED
+                else:
+                    seen[count] = node
+                    count += 1
+                if there.after != INSIDE:
+                    for way in range(
+                        2
+                    ):  # the edge that starts there; and the one that ends there, from out of reach
+                        other = there.after
+                        if wp.static(way == 1):
+                            other = before[k]
+                        end = seen_from(here, other, site[other])
+                        if other != i and (way == 0 or square(end.x, end.y) > within):
+                            if edges == most_edges:
+                                fate = CROWDED
+                            else:
+                                starts[edges] = node
+                                ends[edges] = end
+                                edges += 1
+        begin, last = wp.int32(-1), wp.int32(-1)
+        if here.after != INSIDE or edges > 0:
+            after, previous = here.after, before[i]
+            kept = wp.int32(0)
+            for m in range(count):
+                node = seen[m]
+                hidden = wp.bool(False)
+                if after != INSIDE:
+                    ahead, behind = seen_from(here, after, site[after]), seen_from(here, previous, site[previous])
+                    hidden = outside(ahead, behind, node)
+                for e in range(edges):
+                    hidden = hidden or hides(starts[e], ends[e], node)
+                if not hidden:
+                    seen[kept] = node
+                    if node.id == after:
+                        begin = kept
+                    if node.id == previous:
+                        last = kept
+                    kept += 1
+            count = kept
+        if here.after == INSIDE:
+            begin = nearest(seen, count)
+            last = begin
+        if begin < 0 or last < 0:
+            fate = wp.max(fate, wp.int32(OPEN))
+        link = wp.zeros(shape=MOST_NEIGHBOURS, dtype=int)
+        degree, least, j, going = wp.int32(0), wp.int32(0), begin, fate < OPEN
+        while going:
+            link[degree] = seen[j].id
+            if link[degree] < link[least]:
+                least = degree
+            degree += 1
+            following = next_after(i, j, seen, count)
+            if following < 0:
+                fate = OPEN
+            elif degree == MOST_NEIGHBOURS:
                 fate = CROWDED
-            else:
-                seen[count] = node
-                count += 1
-            if there.after != INSIDE:
-                for way in range(2):  # the edge that starts there; and the one that ends there, from out of reach
-                    other = there.after
-                    if wp.static(way == 1):
-                        other = before[k]
-                    end = seen_from(here, other, site[other])
-                    if other != i and (way == 0 or square(end.x, end.y) > within):
-                        if edges == MOST_EDGES:
-                            fate = CROWDED
-                        else:
-                            starts[edges] = node
-                            ends[edges] = end
-                            edges += 1
-    begin, last = wp.int32(-1), wp.int32(-1)
-    if here.after != INSIDE or edges > 0:
-        after, previous = here.after, before[i]
-        kept = wp.int32(0)
-        for m in range(count):
-            node = seen[m]
-            hidden = wp.bool(False)
-            if after != INSIDE:
-                ahead, behind = seen_from(here, after, site[after]), seen_from(here, previous, site[previous])
-                hidden = outside(ahead, behind, node)
-            for e in range(edges):
-                hidden = hidden or hides(starts[e], ends[e], node)
-            if not hidden:
-                seen[kept] = node
-                if node.id == after:
-                    begin = kept
-                if node.id == previous:
-                    last = kept
-                kept += 1
-        count = kept
-    if here.after == INSIDE:
-        begin = nearest(seen, count)
-        last = begin
-    if begin < 0 or last < 0:
-        fate = wp.max(fate, wp.int32(OPEN))
-    link = wp.zeros(shape=MOST_NEIGHBOURS, dtype=int)
-    degree, least, j, going = wp.int32(0), wp.int32(0), begin, fate < OPEN
-    while going:
-        link[degree] = seen[j].id
-        if link[degree] < link[least]:
-            least = degree
-        degree += 1
-        following = next_after(i, j, seen, count)
-        if following < 0:
-            fate = OPEN
-        elif degree == MOST_NEIGHBOURS:
-            fate = CROWDED
-        elif not sees_all(seen[j], seen[following], reach, weight):
-            fate = UNCERTAIN
-        going = fate < OPEN and following != last
-        j = following
-    if here.after != INSIDE and fate < OPEN:  # the last is not the first again
-        link[degree] = seen[last].id
-        degree += 1
-        least = 0
-    if fate >= OPEN:
-        degree = 0
-    for m in range(degree):
-        turned = m + least
-        if turned >= degree:
-            turned -= degree
-        stars.row[i, m] = link[turned]
-    stars.degree[i] = degree
-    stars.fate[i] = fate
+            elif not sees_all(seen[j], seen[following], reach, weight):
+                fate = UNCERTAIN
+            going = fate < OPEN and following != last
+            j = following
+        if here.after != INSIDE and fate < OPEN:  # the last is not the first again
+            link[degree] = seen[last].id
+            degree += 1
+            least = 0
+        if fate >= OPEN:
+            degree = 0
+        for m in range(degree):
+            turned = m + least
+            if turned >= degree:
+                turned -= degree
+            stars.row[i, m] = link[turned]
+        stars.degree[i] = degree
+        stars.fate[i] = fate
+
+    return wrap
