@@ -14,7 +14,9 @@ from ..device.precision import Precision
 from .outline import INSIDE, OutlineArrays
 from .wrapping import Stars
 
-STRAIGHT = 0.27  # tangent of what an angle lacks to 180 degrees: 5 degrees
+# Tangent of what the angle under which a node sees an edge of one spacing lacks to 180 degrees; of one twice as long
+# four times as much.
+STRAIGHT = 0.0875
 
 
 class Peeling:
@@ -22,6 +24,7 @@ class Peeling:
 
     Args:
         n: number of nodes.
+        spacing: length of an edge [m].
         precision: of the positions.
         launcher: launches the kernels.
 
@@ -29,15 +32,16 @@ class Peeling:
         kernels: all that it launches.
     """
 
-    def __init__(self, n: int, precision: Precision, launcher: Launcher):
+    def __init__(self, n: int, spacing: float, precision: Precision, launcher: Launcher):
         self._launcher, self._find = launcher, _find_kernel(precision)
+        self._share = STRAIGHT / spacing**2
         self._onto = wp.zeros(n, dtype=wp.int32, device=launcher.device)
         self.kernels = (self._find, _join)
 
     def peel(self, positions: wp.array, stars: Stars, outline: OutlineArrays) -> None:
         """Move nodes [m] onto edges of the outline, of which they are then a part."""
         launch, onto = self._launcher.launch, self._onto
-        launch(self._find, onto, [positions, stars, outline, onto])
+        launch(self._find, onto, [self._share, positions, stars, outline, onto])
         launch(_join, onto, [onto, stars, outline])
 
 
@@ -49,13 +53,14 @@ def _find_kernel(precision: Precision):
     @forward_kernel
     def find(
         first: int,
+        share: real,
         positions: wp.array(dtype=vector),
         stars: Stars,
         outline: OutlineArrays,
         onto: wp.array(dtype=wp.int32),
     ):
         i = first + wp.tid()
-        joined, degree, x, least = wp.int32(INSIDE), stars.degree[i], positions[i], real(STRAIGHT)
+        joined, degree, x, least = wp.int32(INSIDE), stars.degree[i], positions[i], real(wp.inf)
         place = vector()
         if outline.after[i] == INSIDE:
             for k in range(degree):
@@ -64,10 +69,11 @@ def _find_kernel(precision: Precision):
                     start, end = positions[a] - x, positions[b] - x
                     ahead = -wp.dot(start, end)
                     height = start[0] * end[1] - start[1] * end[0]
-                    if ahead > real(0.0) and height < least * ahead:
+                    edge = end - start
+                    near = height < share * wp.dot(edge, edge) * ahead
+                    if ahead > real(0.0) and near and height < least * ahead:
                         least = height / ahead
                         joined = a
-                        edge = end - start
                         place = x + start - (wp.dot(start, edge) / wp.dot(edge, edge)) * edge
         onto[i] = joined
         if joined != INSIDE:

@@ -57,7 +57,7 @@ class Triangulation:
             wp.zeros(n, dtype=wp.int32, device=device) for _ in range(3)
         )
         self._stars.row = wp.zeros((n, MOST_NEIGHBOURS), dtype=wp.int32, device=device)
-        self.outline, self._peeling = self._sites.outline, Peeling(n, precision, launcher)
+        self.outline, self._peeling = self._sites.outline, Peeling(n, 0.5 * near, precision, launcher)
         parts = (self._sites, self._chosen, self.tables, self._peeling)
         self.kernels = (check, follow, _look_farther, *(kernel for _, kernel in self._looks))
         self.kernels += tuple(kernel for part in parts for kernel in part.kernels)
