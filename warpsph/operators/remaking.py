@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import numpy as np
 import warp as wp
 
 from ..device.compiling import forward_kernel
@@ -10,7 +11,7 @@ from ..physics.space import Space
 from ..remaking.outline import outline_of
 from ..remaking.tables import CellTables
 from ..remaking.triangulation import Triangulation
-from ..state.cell_body import ELASTIC, REMADE, CellBody, cell_node_types, enter
+from ..state.cell_body import ELASTIC, FORCES, REMADE, CellBody, cell_node_types, enter
 from ..state.cells import NodeCells, corner_place
 from ..state.clock import Clock
 from .cell_shape import cell_shape
@@ -39,7 +40,7 @@ class Remaking:
 
     def __init__(self, body: CellBody, clock: Clock):
         scene, space, launcher = body.scene, body.space, body.launcher
-        self._body, self.on, self.kernels = body, scene.cells is not None, ()
+        self._body, self._clock, self.on, self.kernels = body, clock, scene.cells is not None, ()
         self.begun, self.made, self.refused, self.outline = False, 0, 0, None
         if not self.on:
             return
@@ -59,6 +60,9 @@ class Remaking:
             launcher=launcher,
         )
         self.outline = self._triangulation.outline
+        held = np.zeros(n, dtype=np.int32)
+        held[scene.boundary.nodes] = 1
+        self._triangulation.surfacing.held.assign(held)
         self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
         self._measure, self._install = _volume_kernel(space, body.kind), _install_kernel(space, body.kind)
         self._book, self._move = _book_kernel(space, body.law), _move_kernel(space)
@@ -91,8 +95,8 @@ class Remaking:
                 return
         launch(self._positions_of, self._positions, [body.nodes, self._positions])
         triangulation = self._triangulation
-        triangulation.peel(self._positions)
-        launch(self._move, self._positions, [self._positions, nodes])
+        triangulation.surface(self._positions)
+        launch(self._move, self._positions, [self._clock.forces, self._positions, nodes])
         if not triangulation.renew(self._positions):
             self.refused += 1
         elif triangulation.wrapped:
@@ -134,14 +138,17 @@ def _positions_kernel(space: Space):
 
 @cache
 def _move_kernel(space: Space):
-    """Put nodes where they were moved to; all others stay where they are."""
+    """Put nodes where they were moved to, and book what the body force would have done; all others stay."""
     CellNodes, vector = cell_node_types(space)[1], space.types.vector
 
     @forward_kernel
-    def move(first: int, positions: wp.array(dtype=vector), nodes: CellNodes):
+    def move(first: int, body_force: wp.array(dtype=vector), positions: wp.array(dtype=vector), nodes: CellNodes):
         i = first + wp.tid()
         shift = positions[i] - nodes.point[i].x
         if wp.length_sq(shift) > space.real(0.0):
+            work = wp.float64(nodes.mass[i] * wp.dot(body_force[0], shift))
+            enter(FORCES, i, work, nodes.books)
+            enter(REMADE, i, work, nodes.books)
             u = nodes.displacement[i] + shift
             nodes.displacement[i] = u
             nodes.point[i].x = nodes.reference[i] + u

@@ -11,8 +11,8 @@ from .checking import check, follow
 from .chosen import Chosen
 from .exact import REACH
 from .outline import Outline
-from .peeling import Peeling
 from .sites import Sites
+from .surfacing import Surfacing
 from .tables import CellTables
 from .wrapping import CERTAIN, MOST_NEIGHBOURS, Stars, wrap_kernel
 
@@ -33,6 +33,7 @@ class Triangulation:
 
     Attributes:
         outline: `OutlineArrays`, the outline as it is.
+        surfacing: takes nodes onto it, and off it.
         tables: the cells, and those around each node.
         wrapped: how many stars were wrapped when it was last made or renewed.
         kernels: all that it launches.
@@ -52,13 +53,14 @@ class Triangulation:
         self._launcher, self.wrapped, self._sound, self._near = launcher, 0, False, near / reach
         self._looks = ((self._near, wrap_kernel(*MOST_NEAR)), (1.0, wrap_kernel(*MOST_FAR)))
         self._sites = Sites(outline, reach=reach, weight=weight, precision=precision, launcher=launcher)
+        self._joining = True
         self._chosen, self.tables, self._stars = Chosen(n, launcher), CellTables(n, launcher), Stars()
         self._stars.degree, self._stars.fate, self._fresh = (
             wp.zeros(n, dtype=wp.int32, device=device) for _ in range(3)
         )
         self._stars.row = wp.zeros((n, MOST_NEIGHBOURS), dtype=wp.int32, device=device)
-        self.outline, self._peeling = self._sites.outline, Peeling(n, 0.5 * near, precision, launcher)
-        parts = (self._sites, self._chosen, self.tables, self._peeling)
+        self.outline, self.surfacing = self._sites.outline, Surfacing(n, 0.5 * near, precision, launcher)
+        parts = (self._sites, self._chosen, self.tables, self.surfacing)
         self.kernels = (check, follow, _look_farther, *(kernel for _, kernel in self._looks))
         self.kernels += tuple(kernel for part in parts for kernel in part.kernels)
 
@@ -89,10 +91,12 @@ class Triangulation:
             launch(follow, site, [site, self._fresh, stars, self._chosen.flags])
         return self._fill() if self.wrapped else True
 
-    def peel(self, positions: wp.array) -> None:
-        """Take nodes that have come to the outline onto it [m], before cells are renewed; see `peeling`."""
+    def surface(self, positions: wp.array) -> None:
+        """Take nodes [m] onto the outline, or, every other time, off it, before cells are renewed."""
         if self._sound:
-            self._peeling.peel(positions, self._stars, self.outline)
+            change = self.surfacing.join if self._joining else self.surfacing.leave
+            change(positions, self._stars, self.outline)
+            self._joining = not self._joining
 
     def _place(self, positions: wp.array) -> None:
         self._sites.place(positions)
