@@ -57,7 +57,7 @@ class CellStepper(Stepper):
         )
         c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
-        device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
+        device, real, cells = launcher.device, space.real, body.corners.shape[0]
         n, moves = len(scene.mesh.nodes), scene.large_displacements
         self.conditions = held_table(scene.boundary, n, space=space, device=device, clock=clock)
         self._numbers = wp.zeros(
