@@ -8,12 +8,13 @@ import warp as wp
 from ..device.compiling import forward_kernel
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
-from ..remaking.outline import outline_of
+from ..remaking.outline import copy_outline, outline_arrays, outline_of
 from ..remaking.tables import CellTables
 from ..remaking.triangulation import Triangulation
 from ..state.cell_body import ELASTIC, FORCES, REMADE, CellBody, cell_node_types, enter
 from ..state.cells import NodeCells, corner_place
 from ..state.clock import Clock
+from ..state.part import Part
 from .cell_shape import cell_shape
 
 NEAR, SEEN = 2.0, 6.0  # spacings: how far a star looks first, and at all
@@ -29,54 +30,46 @@ class Remaking:
     Args:
         body: the body in its initial state; its arrays of cells are written.
         clock: gives the flag that says that it is time to look.
+        limit: is refreshed where cells are new; its flag is before this one's.
 
     Attributes:
         on: whether it was asked for.
         outline: `OutlineArrays`, or None.
         begun: whether cells have been made anew yet.
+        joining: whether nodes join the outline, at the next look, or leave it.
         made, refused: how often they were, and how often they could not be, since the outline crosses itself.
         kernels: all that it launches.
     """
 
-    def __init__(self, body: CellBody, clock: Clock):
+    def __init__(self, body: CellBody, clock: Clock, limit: Part):
         scene, space, launcher = body.scene, body.space, body.launcher
-        self._body, self._clock, self.on, self.kernels = body, clock, scene.cells is not None, ()
-        self.begun, self.made, self.refused, self.outline = False, 0, 0, None
+        self._body, self._clock, self._limit = body, clock, limit
+        self.on, self.kernels = scene.cells is not None, ()
+        self.begun, self.joining, self.made, self.refused, self.outline = False, True, 0, 0, None
         if not self.on:
             return
-        n, device, spacing = body.nodes.mass.shape[0], launcher.device, scene.mesh.spacing
+        n, device, spacing, real = body.nodes.mass.shape[0], launcher.device, scene.mesh.spacing, space.real
         self.outdated, self._every = clock.new_flag(), scene.cells.every
         self._steps = wp.zeros(1, dtype=wp.int32, device=device)
-        self._positions = wp.zeros(n, dtype=space.types.vector, device=device)
-        self._volume = wp.zeros(n, dtype=space.real, device=device)
-        self._shape = wp.zeros(body.corners.shape[0], dtype=space.real, device=device)
-        self._worn = wp.zeros(1, dtype=wp.int32, device=device)
-        self._triangulation = Triangulation(
-            outline_of(scene.mesh),
-            near=NEAR * spacing,
-            reach=SEEN * spacing,
-            weight=WEIGHT * spacing**2,
-            precision=space.precision,
-            launcher=launcher,
+        self._shape = wp.zeros(body.corners.shape[0], dtype=real, device=device)
+        outline, triangulation = outline_of(scene.mesh), {"precision": space.precision, "launcher": launcher}
+        made = Triangulation(
+            outline, near=NEAR * spacing, reach=SEEN * spacing, weight=WEIGHT * spacing**2, **triangulation
         )
-        self.outline = self._triangulation.outline
         held = np.zeros(n, dtype=np.int32)
         held[scene.boundary.nodes] = 1
-        self._triangulation.surfacing.held.assign(held)
+        made.surfacing.held.assign(held)
+        self.outline = made.outline
+        self._triangulation, self._kept = made, outline_arrays(outline, device)
+        self._positions = wp.zeros(n, dtype=space.types.vector, device=device)
+        self._volume = wp.zeros(n, dtype=real, device=device)
+        self._flag = wp.zeros(1, dtype=wp.int32, device=device)
         self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
         self._measure, self._install = _volume_kernel(space, body.kind), _install_kernel(space, body.kind)
         self._book, self._move = _book_kernel(space, body.law), _move_kernel(space)
-        self.kernels = (
-            _count,
-            self._positions_of,
-            self._wear,
-            self._measure,
-            self._install,
-            self._book,
-            self._move,
-        )
-        self.kernels += self._triangulation.kernels
-        body.launcher.launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
+        self.kernels = (_count, self._positions_of, self._wear, self._measure, self._install)
+        self.kernels += (self._book, self._move, *made.kernels)
+        self._worn()
 
     def count(self) -> None:
         """Count a step."""
@@ -84,37 +77,64 @@ class Remaking:
             self._body.launcher.launch(_count, self._steps, [self._every, self._steps, self.outdated])
 
     def refresh(self) -> None:
-        """Look at the cells, and make anew those that no longer serve."""
-        body, nodes, launch = self._body, self._body.nodes, self._body.launcher.launch
+        """Look at the cells, if it is time to, and make anew those that no longer serve."""
+        if self._steps.numpy()[0] < self._every:
+            return
         self._steps.zero_()
         self.outdated.zero_()
+        triangulation, kept = self._triangulation, self._kept
         if not self.begun:
-            launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, self._worn])
-            self.begun = bool(self._worn.numpy()[0])
-            if not self.begun:
+            if not self._worn() or not triangulation.make(self._places()):
                 return
-        launch(self._positions_of, self._positions, [body.nodes, self._positions])
-        triangulation = self._triangulation
-        triangulation.surface(self._positions)
-        launch(self._move, self._positions, [self._clock.forces, self._positions, nodes])
-        if not triangulation.renew(self._positions):
+            self.begun = True
+            self._replace(triangulation.tables)
+            return
+        copy_outline(kept, self.outline)
+        sound = self._renew(surfacing=True)
+        if not sound:
+            copy_outline(self.outline, kept)
+            sound = self._renew(surfacing=False)
+        self.joining = not self.joining
+        if not sound:
             self.refused += 1
         elif triangulation.wrapped:
-            self.made += 1
             self._replace(triangulation.tables)
 
+    def _places(self) -> wp.array:
+        """Where the nodes are [m]."""
+        self._body.launcher.launch(self._positions_of, self._positions, [self._body.nodes, self._positions])
+        return self._positions
+
+    def _worn(self) -> bool:
+        """Whether a cell has lost its shape."""
+        body, worn = self._body, self._flag
+        body.launcher.launch(self._wear, self._shape, [body.corners, body.nodes, self._shape, worn])
+        return bool(worn.numpy()[0])
+
+    def _renew(self, *, surfacing: bool) -> bool:
+        """Find the cells that there should be, and whether they could be found."""
+        triangulation, positions = self._triangulation, self._places()
+        if not triangulation.sound:
+            triangulation.adopt(self._body.corners, self._body.node_cells)
+        if surfacing:
+            triangulation.surface(positions, self.joining)
+        return triangulation.renew(positions)
+
     def _replace(self, tables: CellTables) -> None:
-        """Put new cells in place."""
+        """Put nodes and new cells in place."""
         body, launch = self._body, self._body.launcher.launch
-        nodes, table = body.nodes, body.node_cells
-        launch(self._measure, self._volume, [body.corners, table, nodes, self._volume])
-        launch(self._book, self._volume, [body.parameters, self._volume, wp.float64(1.0), nodes])
-        wp.copy(table.first, tables.node_cells.first)
+        nodes, table, volume = body.nodes, body.node_cells, self._volume
+        launch(self._move, self._positions, [self._clock.forces, self._positions, nodes])
+        launch(self._measure, volume, [body.corners, table, nodes, volume])
+        launch(self._book, volume, [body.parameters, volume, wp.float64(1.0), nodes])
+        wp.copy(table.first, tables.node_cells.first, count=len(tables.node_cells.first))
         wp.copy(table.place, tables.node_cells.place, count=3 * tables.cells)
-        launch(self._measure, self._volume, [tables.corners, table, nodes, self._volume])
-        launch(self._book, self._volume, [body.parameters, self._volume, wp.float64(-1.0), nodes])
-        inputs = [tables.cells, tables.corners, nodes, self._volume, body.corners, body.cell_mass]
+        launch(self._measure, volume, [tables.corners, table, nodes, volume])
+        launch(self._book, volume, [body.parameters, volume, wp.float64(-1.0), nodes])
+        inputs = [tables.cells, tables.corners, nodes, volume, body.corners, body.cell_mass]
         launch(self._install, body.cell_mass, inputs)
+        self._limit.refresh()
+        self.made += 1
 
 
 @forward_kernel

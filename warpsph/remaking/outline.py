@@ -40,6 +40,12 @@ def outline_arrays(outline: Outline, device: wp.Device) -> OutlineArrays:
     return arrays
 
 
+def copy_outline(to: OutlineArrays, outline: OutlineArrays) -> None:
+    """Copy an outline."""
+    wp.copy(to.after, outline.after)
+    wp.copy(to.before, outline.before)
+
+
 def outline_of(mesh: Mesh) -> Outline:
     """The outline of a mesh of plane cells.
 

@@ -7,10 +7,11 @@ import warp as wp
 from ..device.compiling import forward_kernel
 from ..device.launching import Launcher
 from ..device.precision import Precision
+from ..state.cells import NodeCells
 from .checking import check, follow
 from .chosen import Chosen
 from .exact import REACH
-from .outline import Outline
+from .outline import INSIDE, Outline, OutlineArrays
 from .sites import Sites
 from .surfacing import Surfacing
 from .tables import CellTables
@@ -35,6 +36,7 @@ class Triangulation:
         outline: `OutlineArrays`, the outline as it is.
         surfacing: takes nodes onto it, and off it.
         tables: the cells, and those around each node.
+        sound: whether there are cells to renew.
         wrapped: how many stars were wrapped when it was last made or renewed.
         kernels: all that it launches.
     """
@@ -50,10 +52,10 @@ class Triangulation:
         launcher: Launcher,
     ):
         n, device = len(outline.after), launcher.device
-        self._launcher, self.wrapped, self._sound, self._near = launcher, 0, False, near / reach
+        self._launcher, self.wrapped, self.sound, self._near = launcher, 0, False, near / reach
         self._looks = ((self._near, wrap_kernel(*MOST_NEAR)), (1.0, wrap_kernel(*MOST_FAR)))
         self._sites = Sites(outline, reach=reach, weight=weight, precision=precision, launcher=launcher)
-        self._joining = True
+        self._sorted = False
         self._chosen, self.tables, self._stars = Chosen(n, launcher), CellTables(n, launcher), Stars()
         self._stars.degree, self._stars.fate, self._fresh = (
             wp.zeros(n, dtype=wp.int32, device=device) for _ in range(3)
@@ -61,7 +63,7 @@ class Triangulation:
         self._stars.row = wp.zeros((n, MOST_NEIGHBOURS), dtype=wp.int32, device=device)
         self.outline, self.surfacing = self._sites.outline, Surfacing(n, 0.5 * near, precision, launcher)
         parts = (self._sites, self._chosen, self.tables, self.surfacing)
-        self.kernels = (check, follow, _look_farther, *(kernel for _, kernel in self._looks))
+        self.kernels = (check, follow, _look_farther, _adopt, *(kernel for _, kernel in self._looks))
         self.kernels += tuple(kernel for part in parts for kernel in part.kernels)
 
     def make(self, positions: wp.array) -> bool:
@@ -81,7 +83,7 @@ class Triangulation:
 
     def renew(self, positions: wp.array) -> bool:
         """The same cells as `make`, from those there are: only stars that no longer serve are wrapped anew."""
-        if not self._sound:
+        if not self.sound:
             return self.make(positions)
         self._place(positions)
         launch, site, stars = self._launcher.launch, self._sites.site, self._stars
@@ -91,12 +93,16 @@ class Triangulation:
             launch(follow, site, [site, self._fresh, stars, self._chosen.flags])
         return self._fill() if self.wrapped else True
 
-    def surface(self, positions: wp.array) -> None:
-        """Take nodes [m] onto the outline, or, every other time, off it, before cells are renewed."""
-        if self._sound:
-            change = self.surfacing.join if self._joining else self.surfacing.leave
-            change(positions, self._stars, self.outline)
-            self._joining = not self._joining
+    def adopt(self, corners: wp.array, node_cells: NodeCells) -> None:
+        """Take cells that `tables` had once for those there are, to renew them."""
+        inputs = [corners, node_cells, self.outline, self._stars]
+        self._launcher.launch(_adopt, self._stars.degree, inputs)
+        self.sound = True
+
+    def surface(self, positions: wp.array, joining: bool) -> None:
+        """Take nodes [m] onto the outline, or off it, before cells are renewed."""
+        change = self.surfacing.join if joining else self.surfacing.leave
+        change(positions, self._stars, self.outline)
 
     def _place(self, positions: wp.array) -> None:
         self._sites.place(positions)
@@ -118,8 +124,8 @@ class Triangulation:
                 return
 
     def _fill(self) -> bool:
-        self._sound = not self._sites.far.numpy()[0] and self.tables.fill(self._sites.site, self._stars)
-        return self._sound
+        self.sound = not self._sites.far.numpy()[0] and self.tables.fill(self._sites.site, self._stars)
+        return self.sound
 
 
 @forward_kernel
@@ -134,3 +140,22 @@ def _look_farther(
     if flags[i] != 0:
         fresh[i] = 1
         flags[i] = int(fate[i] != CERTAIN)
+
+
+@forward_kernel
+def _adopt(
+    first: int,
+    corners: wp.array2d(dtype=wp.int32),
+    node_cells: NodeCells,
+    outline: OutlineArrays,
+    stars: Stars,
+):
+    """The star of a node from the cells around it, which stand in its order."""
+    i = first + wp.tid()
+    start, cells = node_cells.first[i], node_cells.first[i + 1] - node_cells.first[i]
+    for k in range(cells):
+        place = node_cells.place[start + k]
+        stars.row[i, k] = corners[place // 3, (place + 1) % 3]
+        if k == cells - 1 and outline.after[i] != INSIDE:
+            stars.row[i, cells] = corners[place // 3, (place + 2) % 3]
+    stars.degree[i] = wp.where(outline.after[i] != INSIDE, cells + 1, cells)

@@ -111,7 +111,10 @@ class CellBody(Body):
         corners = cell_table(mesh, mesh.kind, device)
         cell_mass = scene.material.density * mesh.cell_volumes()
         if scene.cells is not None:
-            corners, cell_mass = with_room(corners, table, n), np.append(cell_mass, np.zeros(2 * n - len(cell_mass)))
+            corners, cell_mass = (
+                with_room(corners, table, n),
+                np.append(cell_mass, np.zeros(2 * n - len(cell_mass))),
+            )
         return CellBody(
             nodes=nodes,
             corners=corners,

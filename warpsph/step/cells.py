@@ -68,9 +68,9 @@ class CellStepper(Stepper):
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self.loads = LoadedFaces(body, clock, len(driven))
         offset = len(driven) + len(scene.loads.functions)
-        self.remaking = remaking = Remaking(body, clock)
+        self._limit = (CellLimit if scene.cells is None else NodeLimit)(body, clock)
+        self.remaking = remaking = Remaking(body, clock, self._limit)
         self.tools = Tools(body, clock, offset, self.conditions, remaking.outline)
-        self._limit = (NodeLimit if remaking.on else CellLimit)(body, clock)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work, tools=self.tools.work)
         kind, slots, share = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
@@ -81,7 +81,7 @@ class CellStepper(Stepper):
         self._force = force_kernel(space, kind, body.law, sharpening.on)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
-        super().__init__(launcher, clock, parts=(remaking, self._limit) if remaking.on else (self._limit,))
+        super().__init__(launcher, clock, parts=(self._limit, remaking) if remaking.on else (self._limit,))
         for part in (clock, sharpening, self.loads, self.tools, remaking, self._limit, self._energy):
             kernels += part.kernels
         load_kernels(kernels, device)
