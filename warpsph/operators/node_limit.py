@@ -1,9 +1,9 @@
 """How much sooner than at the start a wave is across the cells around a node, where cells are made anew.
 
-What cell T does to the velocities of its corners is at most κ_T Σ_j |v_j|², κ_T = ρ c_p² A_T λ_max(Σ_j ∇N_j ⊗ ∇N_j).
-So no frequency is above the largest of ω_i² = Σ_T κ_T/m_i over the cells around a node: the mean of what
-`warpsph.operators.cell_limit` says of them, by what they share of the node's mass. A cell that is flat, for an edge
-of the outline has come near a node, hardly counts there; by itself it would take all of the time step.
+A cell T is as stiff as κ_T Σ_j |u_j|², κ_T = ρ c_p² A_T λ_max(Σ_j ∇N_j ⊗ ∇N_j). So no frequency is above the largest
+of ω_i² = Σ_T κ_T/m_i over the cells around a node: the mean of what `cell_limit` says of them, by what they share of
+its mass. A cell that is flat, for a node has come near an edge of the outline, counts for little there; by itself
+it would take all of the time step.
 """
 
 from functools import cache
@@ -75,11 +75,11 @@ def _rate_kernel(space: Space, kind: CellKind):
         i = first + wp.tid()
         total = real(0.0)
         for entry in range(table.first[i], table.first[i + 1]):
-            c, corner = place_of(entry, table)
+            c, _corner = place_of(entry, table)
             x = shape.Modes()
             for k in range(wp.static(kind.corners)):
                 x += wp.outer(T[k], nodes.point[corners[c, k]].x)
-            B, volume, frame = shape.measure(x)
+            B, volume, _frame = shape.measure(x)
             total += space.algebra.largest(shape.spread(B)) / wp.abs(volume)
         result[i] = wp.sqrt(real(per_corner) * total / nodes.mass[i])
 

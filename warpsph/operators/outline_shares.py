@@ -1,4 +1,4 @@
-"""How much of a surface is a node's, of a body in the plane whose outline changes: half of both edges around it."""
+"""How much of a surface is a node's where the outline of a body in the plane changes: half of both its edges."""
 
 from functools import cache
 

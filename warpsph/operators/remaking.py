@@ -20,7 +20,7 @@ from .cell_shape import cell_shape
 NEAR, SEEN = 2.0, 6.0  # spacings: how far a star looks first, and at all
 # Of Δx²: the largest weight of a node. Cells of a lattice that turns change by rounding without.
 WEIGHT = 5e-3
-# Cells are made anew from the moment on when one has lost so much of A/Σl², its area over the squares of its edges.
+# Cells are made anew as soon as one has lost so much of A/Σl², its area over the squares of its edges.
 WORN = 0.4
 
 

@@ -1,14 +1,14 @@
 """Which node is met first as a star is wrapped: decided exactly, in integers, with one answer for whoever asks.
 
-Places are whole numbers of units from the node i whose star it is, at most `REACH` away. To the left of its edge to
-j the triangle of Delaunay ends at the k whose circle, through i, j and k, is empty: a node l is met before k if it
-lies in that circle,
+Places are whole numbers of units from the node i whose star it is, at most `REACH` away. To the left of its edge
+to j the triangle of Delaunay ends at the k whose circle, through i, j and k, is empty: a node l is met before k if
+it lies in that circle,
 
     D(j, k, l) = (j × k) Λ_l − (j × l) Λ_k + (k × l) Λ_j < 0,        Λ_k = |k|² + w_i − w_k.
 
-Λ lifts the plane onto a paraboloid; with weights w cells are those of a power diagram. Each product is below 2⁶¹,
-and D below 2⁶³. D = 0, as of every square of a lattice, is decided as if the lift of the node of the least hash had
-been lowered by next to nothing: a diagonal ends in that node.
+Λ lifts the plane onto a paraboloid; with weights w cells are those of a power diagram. Products are below 2⁶¹, D is
+below 2⁶³. D = 0, as of every square of a lattice, is decided as if the lift of the node of the least hash had been
+lowered by next to nothing: a diagonal ends in that node.
 """
 
 import warp as wp

@@ -1,9 +1,9 @@
 """Nodes that come to the outline, and nodes that leave it, where its edges have grown long or short.
 
-A node inside that has come near an edge, and sees it all but straight, joins it: the cell between them would turn over
-next. It is moved onto the edge, so that no area is made or lost, and the edge becomes two. A node of the outline
-with short edges on both sides, all but in line, is moved inside, and both become one. Each node decides for itself,
-and looks at stars only.
+A node inside that has come near an edge, and sees it all but straight, joins it: the cell between them would turn
+over next. It is moved onto the edge, so that no area is made or lost, and the edge becomes two. A node of the
+outline with short edges on both sides, all but in line, is moved inside, and both become one. Each node decides
+for itself, and looks at stars only.
 """
 
 from functools import cache
@@ -17,8 +17,8 @@ from .exact import hash_of
 from .outline import INSIDE, OutlineArrays
 from .wrapping import Stars
 
-# Tangent of what the angle under which a node sees an edge of one spacing lacks to 180 degrees; of one twice as long
-# four times as much.
+# Tangent of what the angle lacks to 180 degrees under which a node that joins sees an edge of one spacing; of one
+# twice as long four times as much.
 STRAIGHT = 0.0875
 SHORT = 1.0  # spacings, both edges of a node that leaves together
 BENT = 0.2  # tangent of the angle between them
@@ -130,7 +130,7 @@ def _join(first: int, onto: wp.array(dtype=wp.int32), stars: Stars, outline: Out
 
 @cache
 def _wish_kernel(precision: Precision):
-    """Which nodes would leave the outline, and for where: the middle of their cells, or, of an ear, of the next."""
+    """Which nodes would leave the outline, and for where: the middle of their cells, of an ear the next one."""
     real, vector = precision.real, precision.vec(2)
 
     @wp.func

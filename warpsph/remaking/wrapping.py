@@ -1,9 +1,9 @@
 """The star of a node, found by itself: its neighbours one by one, counterclockwise, among the nodes near it.
 
 A star begins with the nearest node, or, on the outline, with the one that follows there, and ends with the one
-before. Nodes behind an edge of the outline are not seen, so cells never leave the body, and fill it: a triangulation
-of Delaunay under the constraint of the outline. Cells whose circles are within reach are certain. So are all, if
-each is found by its three corners, whatever their circles: `tables` looks.
+before. Nodes behind an edge of the outline are not seen, so cells never leave the body, and fill it: this is the
+triangulation of Delaunay under the constraint of the outline. Cells whose circles are within reach are certain. So
+are all, if each is found by its three corners, whatever their circles: `tables` looks.
 """
 
 from functools import cache
@@ -55,9 +55,9 @@ def next_after(i: int, j: int, seen: wp.array(dtype=Seen), count: int) -> int:
     """Number of the neighbour that follows j, −1 if none is to the left of it."""
     edge, found = seen[j], wp.int32(-1)
     for k in range(count):
-        if turn(edge, seen[k]) > wp.int64(0):
-            if found < 0 or met_before(i, edge, seen[k], seen[found]):
-                found = k
+        left = turn(edge, seen[k]) > wp.int64(0)
+        if left and (found < 0 or met_before(i, edge, seen[k], seen[found])):
+            found = k
     return found
 
 

@@ -66,7 +66,7 @@ class CellBody(Body):
             `strained` ∫ |d| dt since the step was last measured; `sharpened` K σ [Pa], where it is asked for;
             `flowed` of a law that flows, 1 in a step in which it does, then less and less.
         corners: node indices of each cell, shape (m, c).
-        cell_mass: mass of each cell [kg], constant, shape (m,). Where cells are made anew there is room for 2n, and
+        cell_mass: mass of each cell [kg], constant, shape (m,). Where cells are made anew there is room for 2n;
             those that are none have no mass, and the corners of another.
         slots: whether `node_cells` has them.
         node_cells: the cells around each node.
@@ -126,7 +126,7 @@ class CellBody(Body):
         )
 
     def mesh(self) -> Mesh:
-        """The nodes at the start, and the cells as they are now; without its boundary where those were made anew."""
+        """The nodes at the start, and the cells as they are now; of those made anew without the boundary."""
         mesh = self.scene.mesh
         if self.scene.cells is None:
             return mesh
