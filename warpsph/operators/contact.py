@@ -14,6 +14,7 @@ from .held import held_types
 from .tool_forms import distance_function, exact_vector, middle_function, tool_types, velocity_function
 
 RETURN = 0.1  # of a depth below the slack, by which a node comes out in a step
+NEVER = -1.0
 LEAST_FREE = 1e-6  # of a normal's square along which conditions leave a node free: with less they hold it
 
 
@@ -22,7 +23,8 @@ def contact_types(space: Space) -> type:
     """What boundary nodes remember, a row a node, a column a tool.
 
     `node`; `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
-    former since the start; `settled`, what the last `settle` gave in all; `work` done on the node [J].
+    former since the start; `pressed`, the force that friction goes by over the node's mass, `NEVER` before it has
+    touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` done on it [J].
     """
     vector = space.types.vector
 
@@ -32,6 +34,8 @@ def contact_types(space: Space) -> type:
         impulse: wp.array2d(dtype=vector)
         moment: wp.array2d(dtype=space.vec(3))
         total: wp.array2d(dtype=exact_vector(space))
+        pressed: wp.array2d(dtype=space.real)
+        last: wp.array(dtype=vector)
         settled: wp.array(dtype=vector)
         work: wp.array(dtype=wp.float64)
 
@@ -40,11 +44,12 @@ def contact_types(space: Space) -> type:
 
 @cache
 def meet_function(space: Space) -> wp.Function:
-    """(v, P, V, n, least, μ, stopped, pulls) → the node's velocity after it has met the tool, and whether it has.
+    """(v, P, V, n, least, pulls, μ, pressed, keep, h, stopped) → v when the node has met the tool, the force per
+    mass that friction goes by then, and whether they have met.
 
-    v and P are its velocity and in which directions it is free, V the tool's velocity, n the way out of it, and
-    `least` the least that (v − V)·n may be. Slip is stopped up to μ times what is added along n plus `stopped`. A
-    tool that `pulls` holds back as well.
+    v and P are the node's velocity and in which directions it is free, V the tool's velocity, n the way out of it,
+    and `least` the least that (v − V)·n may be; a tool that `pulls` holds back as well. Of that force `keep` is
+    left of what it was before; times h it is an impulse. Slip is stopped up to μ times that, plus `stopped`.
     """
     real, vector = space.real, space.types.vector
 
@@ -55,23 +60,27 @@ def meet_function(space: Space) -> wp.Function:
         V: vector,
         n: vector,
         least: real,
-        friction: real,
-        stopped: real,
         pulls: bool,
+        friction: real,
+        pressed: real,
+        keep: real,
+        h: real,
+        stopped: real,
     ):
         along = P * n
         free = wp.dot(n, along)
         needed = least - wp.dot(v - V, n)
         if free < real(LEAST_FREE) or not (needed > real(0.0) or pulls):
-            return v, wp.int32(0)
-        pressed = needed / free
-        w = v + pressed * along
+            return v, keep * pressed, wp.int32(0)
+        push = needed / free
+        w = v + push * along
+        force = keep * wp.max(pressed, real(0.0)) + (real(1.0) - keep) * push / h
         slip = P * (w - V)
         slip = slip - (wp.dot(n, slip) / free) * along
-        speed, most = wp.length(slip), friction * pressed + stopped
+        speed, most = wp.length(slip), wp.max(friction * force * h, real(0.0)) + stopped
         if speed > most:
             slip = (most / speed) * slip
-        return w - slip, wp.int32(1)
+        return w - slip, force, wp.int32(1)
 
     return meet
 
@@ -197,7 +206,14 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                     if wp.static(strong and sweep == 0):
                         area = wp.max(-wp.dot(shares[row], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
-                    w, meets = meet(v, P, V, n, least, table.friction[t], stopped, pulls)
+                    keep, pressed = real(0.0), contacts.pressed[row, t] + real(0.0)
+                    rests = pressed < real(0.0) and gap <= table.slack  # from the start
+                    if table.lag[t] > real(0.0) and not rests:
+                        keep = wp.exp(-h / table.lag[t])
+                    friction = table.friction[t]
+                    w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, keep, h, stopped)
+                    if pressed >= real(0.0) or meets == 1:
+                        contacts.pressed[row, t] = force
                     if meets == 1:
                         push = (mass / decay) * (w - v)
                         contacts.impulse[row, t] = contacts.impulse[row, t] + push
@@ -210,6 +226,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
             contacts.settled[row] = pushed
+            contacts.last[row] = nodes.half[i].v
             if met == 1:
                 done = wp.dot(pushed, nodes.half[i].v)
                 contacts.work[row] = contacts.work[row] + wp.float64(done)
@@ -218,8 +235,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
             settled = contacts.settled[row]
             if met == 1 or wp.length_sq(settled) > real(0.0):
                 # The impulses around tⁿ, in the leapfrog's terms: what the step before ended with, and these.
-                last = (start - h * nodes.acceleration[i] - settled / mass) / decay  # v^{n−1/2}
-                back, on = P * (start - last), P * (v - start)
+                back, on = P * (start - contacts.last[row]), P * (v - start)
                 done = wp.dot(pushed, v) + real(0.5) * mass * (wp.length_sq(back) - wp.length_sq(on))
                 contacts.work[row] = contacts.work[row] + wp.float64(done)
                 nodes.half[i].v = v

@@ -5,9 +5,9 @@ an impulse on the node alone. Before it moves (`stop`): the normal velocity, see
 brings the node to the surface by the end of the step, −gap/Δt. After (`settle`): that of a node that was stopped,
 to zero. So nothing is penetrated but by rounding, nodes at rest are at rest, and their reactions are those of held
 nodes. Along the surface the node's velocity is brought to the tool's, by no more than the interface carries:
-friction times the normal impulse, and strength times ½Δt and what of the surface is the node's. What a tool at rest
-does to a node takes energy or none; where nodes land it is that of the approach of one layer of nodes, less and
-less on finer lattices.
+friction times the normal impulse, and strength times ½Δt and what of the surface is the node's. What a tool at
+rest does to a node takes energy or none; where nodes land it is that of the approach of one layer of nodes, less
+and less on finer lattices.
 
 A condition on velocities comes first: impulses push a node only in directions in which it is free.
 """
@@ -20,7 +20,7 @@ from ..scene.scene import Scene
 from ..scene.tool import TOUCHING
 from ..state.cell_body import CellBody
 from ..state.clock import Clock
-from .contact import contact_kernel, contact_types
+from .contact import NEVER, contact_kernel, contact_types
 from .face_shares import FaceShares
 from .tool_forms import exact_vector, move_kernel, tool_table
 
@@ -55,7 +55,8 @@ class Tools:
         contacts.node = wp.array(nodes, dtype=wp.int32, device=device)
         for name, dtype in (("impulse", vector), ("moment", space.vec(3)), ("total", exact_vector(space))):
             setattr(contacts, name, wp.zeros((rows, count), dtype=dtype, device=device))
-        contacts.settled = wp.zeros(rows, dtype=vector, device=device)
+        contacts.pressed = wp.full((rows, count), NEVER, dtype=space.real, device=device)
+        contacts.last, contacts.settled = (wp.zeros(rows, dtype=vector, device=device) for _ in range(2))
         self.work = contacts.work = wp.zeros(rows, dtype=wp.float64, device=device)
         self.travel = wp.zeros(count, dtype=exact_vector(space), device=device)
         self._touched = wp.array(_glued(scene, nodes), dtype=wp.int32, shape=(rows, count), device=device)
@@ -115,7 +116,7 @@ def _glued(scene: Scene, nodes: np.ndarray) -> np.ndarray:
     """Which nodes touch which tools that are glued to them at the start, 1 or 0, shape (b, k)."""
     touched = np.zeros((len(nodes), len(scene.tools)), dtype=np.int32)
     for t, tool in enumerate(scene.tools):
-        if tool.interface.carried[2]:
+        if tool.interface.carried.glued:
             gaps = tool.form(scene.mesh.dim).distance(scene.mesh.nodes[nodes])
             touched[:, t] = gaps <= TOUCHING * scene.mesh.spacing
     return touched
@@ -123,7 +124,7 @@ def _glued(scene: Scene, nodes: np.ndarray) -> np.ndarray:
 
 def _strong(body: CellBody) -> bool:
     """Whether an interface carries shear without pressure."""
-    law, strengths = body.law, [tool.interface.carried[1] for tool in body.scene.tools]
+    law, strengths = body.law, [tool.interface.carried.strength for tool in body.scene.tools]
     if None in strengths and law.flows and law.shear_strength is None:
         tool, name = body.scene.tools[strengths.index(None)], type(body.scene.material).__name__
         raise SceneError("tools", tool, f"the law of {name} does not say its shear strength; take Adhesive")
