@@ -24,7 +24,7 @@ def contact_types(space: Space) -> type:
 
     `node`; `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
     former since the start; `pressed`, the force that friction goes by over the node's mass, `NEVER` before it has
-    touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` done on it [J].
+    touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` [J].
     """
     vector = space.types.vector
 

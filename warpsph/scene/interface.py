@@ -5,8 +5,8 @@ strength; then they slip. What is pulled comes off, unless it is glued.
 
 Friction follows the pressure at once, or with a `lag`, as it was measured to (Prakash and Clifton 1993): the
 pressure p̄ that counts then has dp̄/dt = (p − p̄)/lag. An elastic body without damping that slides under friction
-is unstable (Adams 2000): its waves grow, nodes stick and lift in turn, and the friction that is left is less. A lag
-of the time that waves need through the body leaves its inside at rest.
+is unstable (Adams 2000): its waves grow, nodes stick and lift in turn, and the friction that is left is less. A
+lag of the time that waves need through the body leaves its inside at rest.
 """
 
 from __future__ import annotations
