@@ -1,4 +1,4 @@
-"""Contact of a body's boundary nodes with tools: what `warpsph.operators.tools` launches, and its rules."""
+"""Contact of a body's nodes with tools: what `warpsph.operators.tools` launches, and its rules."""
 
 from functools import cache
 
@@ -20,9 +20,9 @@ LEAST_FREE = 1e-6  # of a normal's square along which conditions leave a node fr
 
 @cache
 def contact_types(space: Space) -> type:
-    """What boundary nodes remember, a row a node, a column a tool.
+    """What nodes remember, a row a node, a column a tool.
 
-    `node`; `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
+    `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
     former since the start; `pressed`, the force that friction goes by over the node's mass, `NEVER` before it has
     touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` [J].
     """
@@ -30,7 +30,6 @@ def contact_types(space: Space) -> type:
 
     @wp.struct
     class Contacts:
-        node: wp.array(dtype=wp.int32)
         impulse: wp.array2d(dtype=vector)
         moment: wp.array2d(dtype=space.vec(3))
         total: wp.array2d(dtype=exact_vector(space))
@@ -44,12 +43,12 @@ def contact_types(space: Space) -> type:
 
 @cache
 def meet_function(space: Space) -> wp.Function:
-    """(v, P, V, n, least, pulls, μ, pressed, keep, h, stopped) → v when the node has met the tool, the force per
+    """(v, P, V, n, least, pulls, μ, pressed, h, lag, stopped) → v when the node has met the tool, the force per
     mass that friction goes by then, and whether they have met.
 
     v and P are the node's velocity and in which directions it is free, V the tool's velocity, n the way out of it,
-    and `least` the least that (v − V)·n may be; a tool that `pulls` holds back as well. Of that force `keep` is
-    left of what it was before; times h it is an impulse. Slip is stopped up to μ times that, plus `stopped`.
+    and `least` the least that (v − V)·n may be; a tool that `pulls` holds back as well. That force, `pressed`
+    before, follows with a lag what presses for the time h. Slip is stopped up to μ times its impulse, plus `stopped`.
     """
     real, vector = space.real, space.types.vector
 
@@ -63,21 +62,27 @@ def meet_function(space: Space) -> wp.Function:
         pulls: bool,
         friction: real,
         pressed: real,
-        keep: real,
         h: real,
+        lag: real,
         stopped: real,
     ):
+        keep = real(0.0)
+        if lag > real(0.0):
+            keep = wp.exp(-h / lag)
         along = P * n
         free = wp.dot(n, along)
         needed = least - wp.dot(v - V, n)
         if free < real(LEAST_FREE) or not (needed > real(0.0) or pulls):
             return v, keep * pressed, wp.int32(0)
         push = needed / free
-        w = v + push * along
-        force = keep * wp.max(pressed, real(0.0)) + (real(1.0) - keep) * push / h
+        w, force = v + push * along, push / h
+        mean, left = force, pressed - force
+        if lag > real(0.0):
+            mean += (real(1.0) - keep) * lag / h * left
+            force += keep * left
         slip = P * (w - V)
         slip = slip - (wp.dot(n, slip) / free) * along
-        speed, most = wp.length(slip), wp.max(friction * force * h, real(0.0)) + stopped
+        speed, most = wp.length(slip), wp.max(friction * mean * h, real(0.0)) + stopped
         if speed > most:
             slip = (most / speed) * slip
         return w - slip, force, wp.int32(1)
@@ -170,11 +175,10 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         contacts: Contacts,
         touched: wp.array2d(dtype=wp.int32),
     ):
-        row = first + wp.tid()
-        dt = time_step[0]
+        i, dt = first + wp.tid(), time_step[0]
         if dt == real(0.0):
             return
-        i, h = contacts.node[row], real(0.5) * dt
+        h = real(0.5) * dt
         mass, x, own = nodes.mass[i], nodes.point[i].x, internal()
         start, sigma = space.phi.velocity(nodes.point[i].phi), space.phi.stress(nodes.point[i].phi)
         before, decay = start, real(1.0)
@@ -182,8 +186,8 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
             before = nodes.half[i].v + vector()
             decay = wp.exp(-damping * h)
             for t in range(touched.shape[1]):
-                contacts.impulse[row, t] = vector()
-                contacts.moment[row, t] = moment()
+                contacts.impulse[i, t] = vector()
+                contacts.moment[i, t] = moment()
         if wp.static(remembers):
             own = internals[i]
         P = unit()
@@ -192,11 +196,11 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         v, met = before + vector(), wp.int32(0)
         for sweep in range(wp.static(sweeps)):
             for t in range(touched.shape[1]):
-                if wp.static(not ends) or touched[row, t] == 1:
+                if wp.static(not ends) or touched[i, t] == 1:
                     at = middle(t, table, travel)
                     gap, n = distance(x, at, t, table)
                     V, least = velocity(t, wp.static(when), table, drive), real(0.0)
-                    pulls = table.glued[t] == 1 and touched[row, t] == 1
+                    pulls = table.glued[t] == 1 and touched[i, t] == 1
                     if wp.static(not ends):
                         if gap > table.slack or pulls:
                             least = -gap / dt
@@ -204,40 +208,41 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                             least = wp.max(real(-RETURN) * (gap + table.slack) / dt, real(0.0))
                     stopped = wp.where(table.glued[t] == 1, real(ENDLESS), real(0.0))
                     if wp.static(strong and sweep == 0):
-                        area = wp.max(-wp.dot(shares[row], n), real(0.0))
+                        area = wp.max(-wp.dot(shares[i], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
-                    keep, pressed = real(0.0), contacts.pressed[row, t] + real(0.0)
-                    rests = pressed < real(0.0) and gap <= table.slack  # from the start
-                    if table.lag[t] > real(0.0) and not rests:
-                        keep = wp.exp(-h / table.lag[t])
+                    pressed, lag = contacts.pressed[i, t] + real(0.0), table.lag[t] + real(0.0)
+                    if pressed < real(0.0):  # it has not touched it yet
+                        pressed = real(0.0)
+                        if gap <= table.slack:
+                            lag = real(0.0)
                     friction = table.friction[t]
-                    w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, keep, h, stopped)
-                    if pressed >= real(0.0) or meets == 1:
-                        contacts.pressed[row, t] = force
+                    w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, h, lag, stopped)
+                    if pressed > real(0.0) or meets == 1:
+                        contacts.pressed[i, t] = force
                     if meets == 1:
                         push = (mass / decay) * (w - v)
-                        contacts.impulse[row, t] = contacts.impulse[row, t] + push
-                        contacts.moment[row, t] = contacts.moment[row, t] + moment_of(x - at, push)
-                        contacts.total[row, t] = contacts.total[row, t] + exactly(push)
+                        contacts.impulse[i, t] = contacts.impulse[i, t] + push
+                        contacts.moment[i, t] = contacts.moment[i, t] + moment_of(x - at, push)
+                        contacts.total[i, t] = contacts.total[i, t] + exactly(push)
                         v = w
                         met = wp.int32(1)
                     if wp.static(not ends):
-                        touched[row, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[row, t])
+                        touched[i, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[i, t])
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
-            contacts.settled[row] = pushed
-            contacts.last[row] = nodes.half[i].v
+            contacts.settled[i] = pushed
+            contacts.last[i] = nodes.half[i].v
             if met == 1:
                 done = wp.dot(pushed, nodes.half[i].v)
-                contacts.work[row] = contacts.work[row] + wp.float64(done)
+                contacts.work[i] = contacts.work[i] + wp.float64(done)
                 nodes.point[i].phi = space.phi.with_velocity(nodes.point[i].phi, v)
         else:
-            settled = contacts.settled[row]
+            settled = contacts.settled[i]
             if met == 1 or wp.length_sq(settled) > real(0.0):
                 # The impulses around tⁿ, in the leapfrog's terms: what the step before ended with, and these.
-                back, on = P * (start - contacts.last[row]), P * (v - start)
+                back, on = P * (start - contacts.last[i]), P * (v - start)
                 done = wp.dot(pushed, v) + real(0.5) * mass * (wp.length_sq(back) - wp.length_sq(on))
-                contacts.work[row] = contacts.work[row] + wp.float64(done)
+                contacts.work[i] = contacts.work[i] + wp.float64(done)
                 nodes.half[i].v = v
                 nodes.half[i].x = x + h * v
 

@@ -1,4 +1,4 @@
-"""Tools (`warpsph.scene.tool`): a body's boundary nodes do not pass them, by impulses that need no stiffness.
+"""Tools (`warpsph.scene.tool`): a body's nodes do not pass them, by impulses that need no stiffness.
 
 A step pushes a node twice, half of it before it moves and half after. Each time what the tools do comes last, as
 an impulse on the node alone. Before it moves (`stop`): the normal velocity, seen from the tool, is raised to what
@@ -37,7 +37,7 @@ class Tools:
         held: the table of the conditions.
 
     Attributes:
-        work: done by the tools on the body [J], a number a node of the boundary.
+        work: done by the tools on the body [J], a number a node.
         travel: how far each has come [m], float64.
         kernels: what it launches.
 
@@ -48,22 +48,21 @@ class Tools:
     def __init__(self, body: CellBody, clock: Clock, offset: int, held):
         scene, space, device = body.scene, body.space, body.launcher.device
         self._body, self._clock, self._held = body, clock, held
-        nodes = np.unique(scene.mesh.faces) if scene.tools else np.zeros(0, dtype=np.int64)
-        rows, count, vector = len(nodes), len(scene.tools), space.types.vector
+        count, vector = len(scene.tools), space.types.vector
+        rows = len(scene.mesh.nodes) if count else 0
         self._any, self._table = count > 0, tool_table(scene, space, device, offset)
         self._contacts = contacts = contact_types(space)()
-        contacts.node = wp.array(nodes, dtype=wp.int32, device=device)
         for name, dtype in (("impulse", vector), ("moment", space.vec(3)), ("total", exact_vector(space))):
             setattr(contacts, name, wp.zeros((rows, count), dtype=dtype, device=device))
         contacts.pressed = wp.full((rows, count), NEVER, dtype=space.real, device=device)
         contacts.last, contacts.settled = (wp.zeros(rows, dtype=vector, device=device) for _ in range(2))
         self.work = contacts.work = wp.zeros(rows, dtype=wp.float64, device=device)
         self.travel = wp.zeros(count, dtype=exact_vector(space), device=device)
-        self._touched = wp.array(_glued(scene, nodes), dtype=wp.int32, shape=(rows, count), device=device)
+        self._touched = wp.array(_glued(scene)[:rows], dtype=wp.int32, shape=(rows, count), device=device)
         self._internals, spare = body.internals, wp.zeros(1, dtype=vector, device=device)
         if self._internals is None:
             self._internals = wp.zeros(1, dtype=space.vec(1), device=device)
-        self._shares = FaceShares(body, nodes) if _strong(body) else None
+        self._shares = FaceShares(body) if _strong(body) else None
         self._areas = spare if self._shares is None else self._shares.vectors
         self.kernels = ()
         if self._any:
@@ -112,12 +111,12 @@ class Tools:
         return total / dt if dt > 0.0 else total
 
 
-def _glued(scene: Scene, nodes: np.ndarray) -> np.ndarray:
-    """Which nodes touch which tools that are glued to them at the start, 1 or 0, shape (b, k)."""
-    touched = np.zeros((len(nodes), len(scene.tools)), dtype=np.int32)
+def _glued(scene: Scene) -> np.ndarray:
+    """Which nodes touch which tools that are glued to them at the start, 1 or 0, shape (n, k)."""
+    touched = np.zeros((len(scene.mesh.nodes), len(scene.tools)), dtype=np.int32)
     for t, tool in enumerate(scene.tools):
         if tool.interface.carried.glued:
-            gaps = tool.form(scene.mesh.dim).distance(scene.mesh.nodes[nodes])
+            gaps = tool.form(scene.mesh.dim).distance(scene.mesh.nodes)
             touched[:, t] = gaps <= TOUCHING * scene.mesh.spacing
     return touched
 
