@@ -20,9 +20,9 @@ LEAST_FREE = 1e-6  # of a normal's square along which conditions leave a node fr
 
 @cache
 def contact_types(space: Space) -> type:
-    """What nodes remember, a row a node, a column a tool.
+    """What nodes that may meet tools remember, a row a node, a column a tool.
 
-    `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
+    `node`; `impulse` on it and its `moment` about the tool's middle, in the last step, and `total` of the
     former since the start; `pressed`, the force that friction goes by over the node's mass, `NEVER` before it has
     touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` [J].
     """
@@ -30,6 +30,7 @@ def contact_types(space: Space) -> type:
 
     @wp.struct
     class Contacts:
+        node: wp.array(dtype=wp.int32)
         impulse: wp.array2d(dtype=vector)
         moment: wp.array2d(dtype=space.vec(3))
         total: wp.array2d(dtype=exact_vector(space))
@@ -48,7 +49,7 @@ def meet_function(space: Space) -> wp.Function:
 
     v and P are the node's velocity and in which directions it is free, V the tool's velocity, n the way out of it,
     and `least` the least that (v − V)·n may be; a tool that `pulls` holds back as well. That force, `pressed`
-    before, follows with a lag what presses for the time h. Slip is stopped up to μ times its impulse, plus `stopped`.
+    before, follows with a lag what presses for the time h; slip is stopped up to μ times its impulse + `stopped`.
     """
     real, vector = space.real, space.types.vector
 
@@ -174,20 +175,34 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         nodes: CellNodes,
         contacts: Contacts,
         touched: wp.array2d(dtype=wp.int32),
+        meeting: wp.array(dtype=wp.int32),
     ):
-        i, dt = first + wp.tid(), time_step[0]
+        row, dt = first + wp.tid(), time_step[0]
         if dt == real(0.0):
             return
-        h = real(0.5) * dt
+        i = contacts.node[row]
+        h, met_before = real(0.5) * dt, meeting[row] + 0  # a value: else it is read where it is asked for
+        if met_before == 0:  # most nodes are far away
+            if wp.static(ends):
+                return
+            near = wp.int32(0)
+            for t in range(touched.shape[1]):
+                gap, n = distance(nodes.point[i].x, middle(t, table, travel), t, table)
+                away = wp.dot(nodes.half[i].v - velocity(t, HALF, table, drive), n)
+                if gap + dt * wp.min(away, real(0.0)) <= table.slack:
+                    near = wp.int32(1)
+            if near == 0:
+                return
         mass, x, own = nodes.mass[i], nodes.point[i].x, internal()
         start, sigma = space.phi.velocity(nodes.point[i].phi), space.phi.stress(nodes.point[i].phi)
         before, decay = start, real(1.0)
         if wp.static(not ends):
             before = nodes.half[i].v + vector()
             decay = wp.exp(-damping * h)
+            meeting[row] = 0
             for t in range(touched.shape[1]):
-                contacts.impulse[i, t] = vector()
-                contacts.moment[i, t] = moment()
+                contacts.impulse[row, t] = vector()
+                contacts.moment[row, t] = moment()
         if wp.static(remembers):
             own = internals[i]
         P = unit()
@@ -196,11 +211,11 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         v, met = before + vector(), wp.int32(0)
         for sweep in range(wp.static(sweeps)):
             for t in range(touched.shape[1]):
-                if wp.static(not ends) or touched[i, t] == 1:
+                if wp.static(not ends) or touched[row, t] == 1:
                     at = middle(t, table, travel)
                     gap, n = distance(x, at, t, table)
                     V, least = velocity(t, wp.static(when), table, drive), real(0.0)
-                    pulls = table.glued[t] == 1 and touched[i, t] == 1
+                    pulls = table.glued[t] == 1 and touched[row, t] == 1
                     if wp.static(not ends):
                         if gap > table.slack or pulls:
                             least = -gap / dt
@@ -210,39 +225,49 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                     if wp.static(strong and sweep == 0):
                         area = wp.max(-wp.dot(shares[i], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
-                    pressed, lag = contacts.pressed[i, t] + real(0.0), table.lag[t] + real(0.0)
+                    pressed, lag = contacts.pressed[row, t] + real(0.0), table.lag[t] + real(0.0)
                     if pressed < real(0.0):  # it has not touched it yet
                         pressed = real(0.0)
                         if gap <= table.slack:
                             lag = real(0.0)
+                    if wp.static(sweep > 0):
+                        lag = real(0.0)
                     friction = table.friction[t]
                     w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, h, lag, stopped)
-                    if pressed > real(0.0) or meets == 1:
-                        contacts.pressed[i, t] = force
+                    if wp.static(sweep == 0):
+                        if pressed > real(0.0) or meets == 1:
+                            contacts.pressed[row, t] = force
+                        if wp.static(not ends) and force > real(0.0):
+                            meeting[row] = 1
                     if meets == 1:
                         push = (mass / decay) * (w - v)
-                        contacts.impulse[i, t] = contacts.impulse[i, t] + push
-                        contacts.moment[i, t] = contacts.moment[i, t] + moment_of(x - at, push)
-                        contacts.total[i, t] = contacts.total[i, t] + exactly(push)
+                        contacts.impulse[row, t] = contacts.impulse[row, t] + push
+                        contacts.moment[row, t] = contacts.moment[row, t] + moment_of(x - at, push)
+                        contacts.total[row, t] = contacts.total[row, t] + exactly(push)
                         v = w
                         met = wp.int32(1)
+                        if wp.static(not ends):
+                            meeting[row] = 1
                     if wp.static(not ends):
-                        touched[i, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[i, t])
+                        touched[row, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[row, t])
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
-            contacts.settled[i] = pushed
-            contacts.last[i] = nodes.half[i].v
+            contacts.settled[row] = pushed
+            contacts.last[row] = nodes.half[i].v
             if met == 1:
                 done = wp.dot(pushed, nodes.half[i].v)
-                contacts.work[i] = contacts.work[i] + wp.float64(done)
+                contacts.work[row] = contacts.work[row] + wp.float64(done)
                 nodes.point[i].phi = space.phi.with_velocity(nodes.point[i].phi, v)
         else:
-            settled = contacts.settled[i]
+            settled = contacts.settled[row]
             if met == 1 or wp.length_sq(settled) > real(0.0):
                 # The impulses around tⁿ, in the leapfrog's terms: what the step before ended with, and these.
-                back, on = P * (start - contacts.last[i]), P * (v - start)
+                last = contacts.last[row] + vector()  # v^{n−1/2}
+                if met_before == 0:
+                    last = (start - h * nodes.acceleration[i]) / decay
+                back, on = P * (start - last), P * (v - start)
                 done = wp.dot(pushed, v) + real(0.5) * mass * (wp.length_sq(back) - wp.length_sq(on))
-                contacts.work[i] = contacts.work[i] + wp.float64(done)
+                contacts.work[row] = contacts.work[row] + wp.float64(done)
                 nodes.half[i].v = v
                 nodes.half[i].x = x + h * v
 

@@ -1,4 +1,4 @@
-"""Tools (`warpsph.scene.tool`): a body's nodes do not pass them, by impulses that need no stiffness.
+"""Tools (`warpsph.scene.tool`): a body's outer nodes do not pass them, by impulses that need no stiffness.
 
 A step pushes a node twice, half of it before it moves and half after. Each time what the tools do comes last, as
 an impulse on the node alone. Before it moves (`stop`): the normal velocity, seen from the tool, is raised to what
@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from ..errors import SceneError
+from ..mesh.mesh import Mesh
 from ..scene.scene import Scene
 from ..scene.tool import TOUCHING
 from ..state.cell_body import CellBody
@@ -37,7 +38,7 @@ class Tools:
         held: the table of the conditions.
 
     Attributes:
-        work: done by the tools on the body [J], a number a node.
+        work: done by the tools on the body [J], a number a node that may meet them.
         travel: how far each has come [m], float64.
         kernels: what it launches.
 
@@ -48,17 +49,19 @@ class Tools:
     def __init__(self, body: CellBody, clock: Clock, offset: int, held):
         scene, space, device = body.scene, body.space, body.launcher.device
         self._body, self._clock, self._held = body, clock, held
-        count, vector = len(scene.tools), space.types.vector
-        rows = len(scene.mesh.nodes) if count else 0
+        nodes = _outer(scene.mesh) if scene.tools else np.zeros(0, dtype=np.int64)
+        rows, count, vector = len(nodes), len(scene.tools), space.types.vector
         self._any, self._table = count > 0, tool_table(scene, space, device, offset)
         self._contacts = contacts = contact_types(space)()
+        contacts.node = wp.array(nodes, dtype=wp.int32, device=device)
         for name, dtype in (("impulse", vector), ("moment", space.vec(3)), ("total", exact_vector(space))):
             setattr(contacts, name, wp.zeros((rows, count), dtype=dtype, device=device))
         contacts.pressed = wp.full((rows, count), NEVER, dtype=space.real, device=device)
         contacts.last, contacts.settled = (wp.zeros(rows, dtype=vector, device=device) for _ in range(2))
         self.work = contacts.work = wp.zeros(rows, dtype=wp.float64, device=device)
         self.travel = wp.zeros(count, dtype=exact_vector(space), device=device)
-        self._touched = wp.array(_glued(scene)[:rows], dtype=wp.int32, shape=(rows, count), device=device)
+        self._touched = wp.array(_glued(scene)[nodes], dtype=wp.int32, shape=(rows, count), device=device)
+        self._meeting = wp.full(rows, 1, dtype=wp.int32, device=device)
         self._internals, spare = body.internals, wp.zeros(1, dtype=vector, device=device)
         if self._internals is None:
             self._internals = wp.zeros(1, dtype=space.vec(1), device=device)
@@ -76,7 +79,15 @@ class Tools:
     def _inputs(self) -> list:
         body, clock = self._body, self._clock
         inputs = [self._table, self.travel, clock.drive, clock.time_step, self._held, body.scene.damping]
-        inputs += [body.parameters, self._internals, self._areas, body.nodes, self._contacts, self._touched]
+        inputs += [
+            body.parameters,
+            self._internals,
+            self._areas,
+            body.nodes,
+            self._contacts,
+            self._touched,
+            self._meeting,
+        ]
         return inputs
 
     def stop(self) -> None:
@@ -109,6 +120,13 @@ class Tools:
         dt = float(self._clock.time_step.numpy()[0])
         total = -given.numpy()[:, tool].astype(float).sum(axis=0)
         return total / dt if dt > 0.0 else total
+
+
+def _outer(mesh: Mesh) -> np.ndarray:
+    """Nodes of the cells at the boundary: no others come near a tool, and to look at all nodes takes time."""
+    boundary = np.zeros(len(mesh.nodes), dtype=bool)
+    boundary[mesh.faces] = True
+    return np.unique(mesh.cells[boundary[mesh.cells].any(axis=1)])
 
 
 def _glued(scene: Scene) -> np.ndarray:
