@@ -1,4 +1,4 @@
-"""Contact of a body's boundary nodes with tools: what `warpsph.operators.tools` launches, and its rules."""
+"""Contact of a body's nodes with tools: what `warpsph.operators.tools` launches, and its rules."""
 
 from functools import cache
 
@@ -14,15 +14,17 @@ from .held import held_types
 from .tool_forms import distance_function, exact_vector, middle_function, tool_types, velocity_function
 
 RETURN = 0.1  # of a depth below the slack, by which a node comes out in a step
+NEVER = -1.0
 LEAST_FREE = 1e-6  # of a normal's square along which conditions leave a node free: with less they hold it
 
 
 @cache
 def contact_types(space: Space) -> type:
-    """What boundary nodes remember, a row a node, a column a tool.
+    """What nodes that may meet tools remember, a row a node, a column a tool.
 
-    `node`; `impulse` on the node and its `moment` about the tool's middle, in the last step, and `total` of the
-    former since the start; `settled`, what the last `settle` gave in all; `work` done on the node [J].
+    `node`; `impulse` on it and its `moment` about the tool's middle, in the last step, and `total` of the
+    former since the start; `pressed`, the force that friction goes by over the node's mass, `NEVER` before it has
+    touched the tool; `last`, v^{n−1/2}; `settled`, what the last `settle` gave the node in all; `work` [J].
     """
     vector = space.types.vector
 
@@ -32,6 +34,8 @@ def contact_types(space: Space) -> type:
         impulse: wp.array2d(dtype=vector)
         moment: wp.array2d(dtype=space.vec(3))
         total: wp.array2d(dtype=exact_vector(space))
+        pressed: wp.array2d(dtype=space.real)
+        last: wp.array(dtype=vector)
         settled: wp.array(dtype=vector)
         work: wp.array(dtype=wp.float64)
 
@@ -40,11 +44,12 @@ def contact_types(space: Space) -> type:
 
 @cache
 def meet_function(space: Space) -> wp.Function:
-    """(v, P, V, n, least, μ, stopped, pulls) → the node's velocity after it has met the tool, and whether it has.
+    """(v, P, V, n, least, pulls, μ, pressed, h, lag, stopped) → v when the node has met the tool, the force per
+    mass that friction goes by then, and whether they have met.
 
-    v and P are its velocity and in which directions it is free, V the tool's velocity, n the way out of it, and
-    `least` the least that (v − V)·n may be. Slip is stopped up to μ times what is added along n plus `stopped`. A
-    tool that `pulls` holds back as well.
+    v and P are the node's velocity and in which directions it is free, V the tool's velocity, n the way out of it,
+    and `least` the least that (v − V)·n may be; a tool that `pulls` holds back as well. That force, `pressed`
+    before, follows with a lag what presses for the time h; slip is stopped up to μ times its impulse + `stopped`.
     """
     real, vector = space.real, space.types.vector
 
@@ -55,23 +60,33 @@ def meet_function(space: Space) -> wp.Function:
         V: vector,
         n: vector,
         least: real,
-        friction: real,
-        stopped: real,
         pulls: bool,
+        friction: real,
+        pressed: real,
+        h: real,
+        lag: real,
+        stopped: real,
     ):
+        keep = real(0.0)
+        if lag > real(0.0):
+            keep = wp.exp(-h / lag)
         along = P * n
         free = wp.dot(n, along)
         needed = least - wp.dot(v - V, n)
         if free < real(LEAST_FREE) or not (needed > real(0.0) or pulls):
-            return v, wp.int32(0)
-        pressed = needed / free
-        w = v + pressed * along
+            return v, keep * pressed, wp.int32(0)
+        push = needed / free
+        w, force = v + push * along, push / h
+        mean, left = force, pressed - force
+        if lag > real(0.0):
+            mean += (real(1.0) - keep) * lag / h * left
+            force += keep * left
         slip = P * (w - V)
         slip = slip - (wp.dot(n, slip) / free) * along
-        speed, most = wp.length(slip), friction * pressed + stopped
+        speed, most = wp.length(slip), wp.max(friction * mean * h, real(0.0)) + stopped
         if speed > most:
             slip = (most / speed) * slip
-        return w - slip, wp.int32(1)
+        return w - slip, force, wp.int32(1)
 
     return meet
 
@@ -160,18 +175,31 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         nodes: CellNodes,
         contacts: Contacts,
         touched: wp.array2d(dtype=wp.int32),
+        meeting: wp.array(dtype=wp.int32),
     ):
-        row = first + wp.tid()
-        dt = time_step[0]
+        row, dt = first + wp.tid(), time_step[0]
         if dt == real(0.0):
             return
-        i, h = contacts.node[row], real(0.5) * dt
+        i = contacts.node[row]
+        h, met_before = real(0.5) * dt, meeting[row] + 0  # a value: else it is read where it is asked for
+        if met_before == 0:  # most nodes are far away
+            if wp.static(ends):
+                return
+            near = wp.int32(0)
+            for t in range(touched.shape[1]):
+                gap, n = distance(nodes.point[i].x, middle(t, table, travel), t, table)
+                away = wp.dot(nodes.half[i].v - velocity(t, HALF, table, drive), n)
+                if gap + dt * wp.min(away, real(0.0)) <= table.slack:
+                    near = wp.int32(1)
+            if near == 0:
+                return
         mass, x, own = nodes.mass[i], nodes.point[i].x, internal()
         start, sigma = space.phi.velocity(nodes.point[i].phi), space.phi.stress(nodes.point[i].phi)
         before, decay = start, real(1.0)
         if wp.static(not ends):
             before = nodes.half[i].v + vector()
             decay = wp.exp(-damping * h)
+            meeting[row] = 0
             for t in range(touched.shape[1]):
                 contacts.impulse[row, t] = vector()
                 contacts.moment[row, t] = moment()
@@ -195,9 +223,22 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                             least = wp.max(real(-RETURN) * (gap + table.slack) / dt, real(0.0))
                     stopped = wp.where(table.glued[t] == 1, real(ENDLESS), real(0.0))
                     if wp.static(strong and sweep == 0):
-                        area = wp.max(-wp.dot(shares[row], n), real(0.0))
+                        area = wp.max(-wp.dot(shares[i], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
-                    w, meets = meet(v, P, V, n, least, table.friction[t], stopped, pulls)
+                    pressed, lag = contacts.pressed[row, t] + real(0.0), table.lag[t] + real(0.0)
+                    if pressed < real(0.0):  # it has not touched it yet
+                        pressed = real(0.0)
+                        if gap <= table.slack:
+                            lag = real(0.0)
+                    if wp.static(sweep > 0):
+                        lag = real(0.0)
+                    friction = table.friction[t]
+                    w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, h, lag, stopped)
+                    if wp.static(sweep == 0):
+                        if pressed > real(0.0) or meets == 1:
+                            contacts.pressed[row, t] = force
+                        if wp.static(not ends) and force > real(0.0):
+                            meeting[row] = 1
                     if meets == 1:
                         push = (mass / decay) * (w - v)
                         contacts.impulse[row, t] = contacts.impulse[row, t] + push
@@ -205,11 +246,14 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         contacts.total[row, t] = contacts.total[row, t] + exactly(push)
                         v = w
                         met = wp.int32(1)
+                        if wp.static(not ends):
+                            meeting[row] = 1
                     if wp.static(not ends):
                         touched[row, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[row, t])
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
             contacts.settled[row] = pushed
+            contacts.last[row] = nodes.half[i].v
             if met == 1:
                 done = wp.dot(pushed, nodes.half[i].v)
                 contacts.work[row] = contacts.work[row] + wp.float64(done)
@@ -218,7 +262,9 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
             settled = contacts.settled[row]
             if met == 1 or wp.length_sq(settled) > real(0.0):
                 # The impulses around tⁿ, in the leapfrog's terms: what the step before ended with, and these.
-                last = (start - h * nodes.acceleration[i] - settled / mass) / decay  # v^{n−1/2}
+                last = contacts.last[row] + vector()  # v^{n−1/2}
+                if met_before == 0:
+                    last = (start - h * nodes.acceleration[i]) / decay
                 back, on = P * (start - last), P * (v - start)
                 done = wp.dot(pushed, v) + real(0.5) * mass * (wp.length_sq(back) - wp.length_sq(on))
                 contacts.work[row] = contacts.work[row] + wp.float64(done)

@@ -1,4 +1,4 @@
-"""How much of a surface is a boundary node's: ∫ N_i n dA over the faces around it, as they are now."""
+"""How much of the surface is a node's: ∫ N_i n dA over the faces around it, as they are now."""
 
 from functools import cache
 
@@ -13,29 +13,28 @@ from ..state.cell_body import CellBody, cell_node_types
 
 
 class FaceShares:
-    """Area vectors, outwards, of the boundary nodes of a body.
+    """Area vectors, outwards, of the nodes of a body, zero inside.
 
     Args:
         body: the body.
-        nodes: indices of its boundary nodes, rising.
 
     Attributes:
         vectors: [mᵈ⁻¹], one a node.
         kernels: what it launches.
     """
 
-    def __init__(self, body: CellBody, nodes: np.ndarray):
+    def __init__(self, body: CellBody):
         mesh, space, device = body.scene.mesh, body.space, body.launcher.device
         self._body = body
         outward = np.sum(area_vectors(mesh.nodes[mesh.faces], mesh.kind) * mesh.face_normals(), axis=1)
         owners = mesh.faces.ravel()
         place = np.argsort(owners, kind="stable")
-        first = np.searchsorted(owners[place], np.append(nodes, len(mesh.nodes)))
+        first = np.searchsorted(owners[place], np.arange(len(mesh.nodes) + 1))
         self._faces = wp.array(mesh.faces, dtype=wp.int32, device=device)
         self._sign = wp.array(np.sign(outward), dtype=space.real, device=device)
         self._parts = wp.zeros(mesh.faces.shape, dtype=space.types.vector, device=device)
         self._first, self._place = (wp.array(row, dtype=wp.int32, device=device) for row in (first, place))
-        self.vectors = wp.zeros(len(nodes), dtype=space.types.vector, device=device)
+        self.vectors = wp.zeros(len(mesh.nodes), dtype=space.types.vector, device=device)
         self._part, self._gather = part_kernel(space, body.kind), share_kernel(space, mesh.faces.shape[1])
         self.kernels = (self._part, self._gather)
 
@@ -103,7 +102,7 @@ def part_kernel(space: Space, kind: CellKind):
 
 @cache
 def share_kernel(space: Space, size: int):
-    """Of each boundary node the parts of the faces around it together; faces have `size` corners."""
+    """Of each node the parts of the faces around it together; faces have `size` corners."""
     vector = space.types.vector
 
     @forward_kernel

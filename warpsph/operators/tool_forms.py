@@ -37,6 +37,7 @@ def tool_types(space: Space) -> type:
         function: wp.array2d(dtype=wp.int32)
         friction: wp.array(dtype=space.real)
         strength: wp.array(dtype=space.real)
+        lag: wp.array(dtype=space.real)
         glued: wp.array(dtype=wp.int32)
         slack: space.real
 
@@ -49,7 +50,7 @@ def tool_table(scene: Scene, space: Space, device: wp.Device, offset: int):
     forms = [tool.form(d) for tool in scene.tools]
     count, carried = len(forms), [tool.interface.carried for tool in scene.tools]
     centres = np.array([_from(mesh.middle, form) for form in forms]).reshape(count, d)
-    strengths = [OWN if strength is None else strength for _, strength, _ in carried]
+    strengths = [OWN if own.strength is None else own.strength for own in carried]
     for name, values, dtype, shape in (
         ("centre", centres, types.vector, count),
         ("axes", np.array([form.axes for form in forms]).reshape(count, d, d), types.tensor, count),
@@ -58,9 +59,10 @@ def tool_table(scene: Scene, space: Space, device: wp.Device, offset: int):
         ("plane", [form.plane for form in forms], wp.int32, count),
         ("revolved", [form.revolved for form in forms], wp.int32, count),
         ("function", offset + scene.tool_functions[1], wp.int32, (count, d)),
-        ("friction", [friction for friction, _, _ in carried], space.real, count),
+        ("friction", [own.friction for own in carried], space.real, count),
         ("strength", strengths, space.real, count),
-        ("glued", [glued for _, _, glued in carried], wp.int32, count),
+        ("lag", [own.lag for own in carried], space.real, count),
+        ("glued", [own.glued for own in carried], wp.int32, count),
     ):
         numbers = np.array(values, dtype=np.int32 if dtype is wp.int32 else float)
         setattr(table, name, wp.array(numbers, dtype=dtype, shape=shape, device=device))

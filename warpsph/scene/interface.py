@@ -2,29 +2,50 @@
 
 Pressed together they carry any pressure, and along the surface at most friction times the pressure plus a
 strength; then they slip. What is pulled comes off, unless it is glued.
+
+Friction follows the pressure at once, or with a `lag`, as it was measured to (Prakash and Clifton 1993): the
+pressure p̄ that counts then has dp̄/dt = (p − p̄)/lag. An elastic body without damping that slides under friction
+is unstable (Adams 2000): its waves grow, nodes stick and lift in turn, and the friction that is left is less. A
+lag of the time that waves need through the body leaves its inside at rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..validate import number
 
 
-@dataclass(frozen=True)
-class Interface:
-    """An interface; a subclass says what it carries.
+class Carried(NamedTuple):
+    """What an interface carries.
 
     Attributes:
         friction: μ, of the pressure [-].
-        strength: shear stress that it carries without pressure [Pa], or None for the soil's own.
+        strength: shear stress without pressure [Pa], or None for the soil's own.
+        lag: of the friction behind the pressure [s].
         glued: whether nodes that have touched the tool stay where they are on it.
     """
 
+    friction: float = 0.0
+    strength: float | None = 0.0
+    lag: float = 0.0
+    glued: bool = False
+
+
+@dataclass(frozen=True)
+class Interface:
+    """An interface; a subclass says what it carries."""
+
     @property
-    def carried(self) -> tuple[float, float | None, bool]:
-        """Friction [-], strength [Pa] or None for the soil's own, and whether it is glued."""
+    def carried(self) -> Carried:
+        """What it carries."""
         raise NotImplementedError
+
+    def _check(self, *names: str) -> None:
+        for name in names:
+            checked = number(f"{type(self).__name__}.{name}", getattr(self, name), at_least=0.0)
+            object.__setattr__(self, name, checked)
 
 
 @dataclass(frozen=True)
@@ -33,7 +54,7 @@ class Smooth(Interface):
 
     @property
     def carried(self):
-        return 0.0, 0.0, False
+        return Carried()
 
 
 @dataclass(frozen=True)
@@ -42,16 +63,18 @@ class Coulomb(Interface):
 
     Args:
         friction: μ [-].
+        lag: by which the friction is behind the pressure [s], see above.
     """
 
     friction: float
+    lag: float = 0.0
 
     def __post_init__(self):
-        object.__setattr__(self, "friction", number("Coulomb.friction", self.friction, at_least=0.0))
+        self._check("friction", "lag")
 
     @property
     def carried(self):
-        return self.friction, 0.0, False
+        return Carried(friction=self.friction, lag=self.lag)
 
 
 @dataclass(frozen=True)
@@ -61,18 +84,19 @@ class Adhesive(Interface):
     Args:
         strength: [Pa].
         friction: μ [-].
+        lag: by which the friction is behind the pressure [s], see above.
     """
 
     strength: float
     friction: float = 0.0
+    lag: float = 0.0
 
     def __post_init__(self):
-        for name in ("strength", "friction"):
-            object.__setattr__(self, name, number(f"Adhesive.{name}", getattr(self, name), at_least=0.0))
+        self._check("strength", "friction", "lag")
 
     @property
     def carried(self):
-        return self.friction, self.strength, False
+        return Carried(friction=self.friction, strength=self.strength, lag=self.lag)
 
 
 @dataclass(frozen=True)
@@ -84,7 +108,7 @@ class Rough(Interface):
 
     @property
     def carried(self):
-        return 0.0, None, False
+        return Carried(strength=None)
 
 
 @dataclass(frozen=True)
@@ -93,4 +117,4 @@ class Glued(Interface):
 
     @property
     def carried(self):
-        return 0.0, 0.0, True
+        return Carried(glued=True)

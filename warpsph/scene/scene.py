@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import SceneError
+from ..mesh.inside import inside
 from ..mesh.mesh import Mesh
 from ..validate import (
     TimeFunction,
@@ -198,7 +199,10 @@ class Scene:
             tool.check(self.mesh.dim)
             if names.index(tool.name) < index:
                 raise SceneError(f"{field}.name", tool.name, "another tool has this name")
-            depth = -tool.form(self.mesh.dim).distance(self.mesh.nodes)
+            form = tool.form(self.mesh.dim)
+            if not form.plane and inside(self.mesh, form.centre):
+                raise SceneError(field, tool, "at the start it is inside the body")
+            depth = -form.distance(self.mesh.nodes)
             if depth.max() > TOUCHING * self.mesh.spacing:
                 node = int(depth.argmax())
                 at = tuple(round(x, 6) for x in self.mesh.nodes[node].tolist())
