@@ -1,9 +1,9 @@
 """How much sooner than at the start a wave is across the cells around a node, where cells are made anew.
 
-A cell T is as stiff as κ_T Σ_j |u_j|², κ_T = ρ c_p² A_T λ_max(Σ_j ∇N_j ⊗ ∇N_j). So no frequency is above the largest
-of ω_i² = Σ_T κ_T/m_i over the cells around a node: the mean of what `cell_limit` says of them, by what they share of
-its mass. A cell that is flat, for a node has come near an edge of the outline, counts for little there; by itself
-it would take all of the time step.
+A cell T is as stiff as κ_T Σ_j |u_j|², κ_T = ρ c_p² A_T λ_max(Σ_j ∇N_j ⊗ ∇N_j). So no frequency is above the
+largest of ω_i² = Σ_T κ_T/m_i over the cells around a node: the mean of what `cell_limit` says of each, by what it
+has of the node's mass. A cell that is flat, for a node has come near an edge of the outline, counts for little;
+by itself it would take all of the time step.
 """
 
 from functools import cache

@@ -6,7 +6,7 @@ it lies in that circle,
 
     D(j, k, l) = (j × k) Λ_l − (j × l) Λ_k + (k × l) Λ_j < 0,        Λ_k = |k|² + w_i − w_k.
 
-Λ lifts the plane onto a paraboloid; with weights w cells are those of a power diagram. Products are below 2⁶¹, D is
+Λ lifts the plane onto a paraboloid; with weights w cells are those of a power diagram. Products are below 2⁶¹, D
 below 2⁶³. D = 0, as of every square of a lattice, is decided as if the lift of the node of the least hash had been
 lowered by next to nothing: a diagonal ends in that node.
 """

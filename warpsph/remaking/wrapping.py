@@ -51,12 +51,15 @@ def nearest(seen: wp.array(dtype=Seen), count: int) -> int:
 
 
 @wp.func
-def next_after(i: int, j: int, seen: wp.array(dtype=Seen), count: int) -> int:
-    """Number of the neighbour that follows j, −1 if none is to the left of it."""
+def next_after(i: int, j: int, end: int, seen: wp.array(dtype=Seen), count: int) -> int:
+    """Number of the neighbour that follows j, −1 if none is to the left of it; none is beyond the end, if any."""
     edge, found = seen[j], wp.int32(-1)
+    ends = wp.bool(False)
+    if end >= 0:
+        ends = turn(edge, seen[end]) > wp.int64(0)
     for k in range(count):
-        left = turn(edge, seen[k]) > wp.int64(0)
-        if left and (found < 0 or met_before(i, edge, seen[k], seen[found])):
+        near = turn(edge, seen[k]) > wp.int64(0) and not (ends and turn(seen[k], seen[end]) < wp.int64(0))
+        if near and (found < 0 or met_before(i, edge, seen[k], seen[found])):
             found = k
     return found
 
@@ -147,6 +150,7 @@ def wrap_kernel(most_seen: int, most_edges: int):
                         last = kept
                     kept += 1
             count = kept
+        bound = last + 0
         if here.after == INSIDE:
             begin = nearest(seen, count)
             last = begin
@@ -159,7 +163,7 @@ def wrap_kernel(most_seen: int, most_edges: int):
             if link[degree] < link[least]:
                 least = degree
             degree += 1
-            following = next_after(i, j, seen, count)
+            following = next_after(i, j, bound, seen, count)
             if following < 0:
                 fate = OPEN
             elif degree == MOST_NEIGHBOURS:
