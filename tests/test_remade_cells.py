@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warpsph import (
     BodyForce,
@@ -21,6 +22,7 @@ from warpsph import (
     edge,
 )
 
+HOPPER = 90  # compute capability 9.0
 HEIGHT, WIDTH, DENSITY, GRAVITY = 2.0, 2.0, 1800.0, 9.81
 
 
@@ -188,3 +190,13 @@ def test_nodes_that_a_condition_holds_stay_on_the_outline():
     assert (after[held] >= 0).all()
     wall = simulation.mesh.nodes[held, 1].argsort()
     np.testing.assert_array_equal(after[held[wall[1:]]], held[wall[:-1]])
+
+
+@pytest.mark.skipif(HOPPER not in wp.get_cuda_supported_archs(), reason="this Warp can not compile for CUDA")
+def test_all_kernels_compile_for_cuda(tmp_path):
+    stepper = Simulation(column(cells=Remade()), "cpu").stepper
+    shares = stepper.tools._shares
+    modules = {kernel.module for part in (stepper.remaking, stepper._limit, shares) for kernel in part.kernels}
+    for module in modules:
+        wp.compile_aot_module(module, arch=HOPPER, module_dir=tmp_path, use_ptx=False)
+    assert len(list(tmp_path.glob("*.cubin"))) == len(modules) > 15
