@@ -348,3 +348,72 @@ def test_all_kernels_compile_for_cuda(tmp_path):
     for module in modules:
         wp.compile_aot_module(module, arch=HOPPER, module_dir=tmp_path, use_ptx=False)
     assert len(list(tmp_path.glob("*.cubin"))) == len(modules) == 11
+
+
+def at(mesh, *place):
+    """The node in a place."""
+    return int(np.flatnonzero((mesh.nodes == place).all(axis=1))[0])
+
+
+def surfaced(mesh, points, joining):
+    """Cells of a body after nodes have joined its outline, or left it, and its nodes and outline then."""
+    made, placed = triangulation(mesh), positions(points)
+    assert made.make(placed)
+    made.surface(placed, joining)
+    assert made.renew(placed)
+    after, before = made.outline.after.numpy(), made.outline.before.numpy()
+    rim = np.flatnonzero(after != INSIDE)
+    np.testing.assert_array_equal(before[after[rim]], rim)
+    np.testing.assert_array_equal(np.flatnonzero(before != INSIDE), rim)
+    cells, points = cells_of(made), placed.numpy()
+    assert abs(areas(points, cells).sum() / 100.0 - 1.0) < 1e-12
+    assert len(cells) == 2 * len(points) - len(rim) - 2
+    return points, after
+
+
+def test_a_node_that_comes_to_an_edge_joins_the_outline():
+    mesh = lattice(10, 10)
+    start, end, node, points = at(mesh, 5, 0), at(mesh, 6, 0), at(mesh, 5, 1), mesh.nodes.copy()
+    points[node] = (5.6, 0.01)
+    found, after = surfaced(mesh, points, joining=True)
+    assert (after[start], after[node]) == (node, end)
+    np.testing.assert_allclose(found[node], (5.6, 0.0), atol=1e-15)
+    np.testing.assert_array_equal(np.delete(found, node, axis=0), np.delete(points, node, axis=0))
+
+
+def test_a_long_edge_takes_a_node_from_farther():
+    """Of three spacings nine times as far: 0.3 above the middle of the edge it sees 157 degrees."""
+    mesh, points = lattice(10, 10), lattice(10, 10).nodes.copy()
+    for x, to in ((3, 2.2), (4, 2.6), (5, 3.0), (6, 6.0), (7, 7.0)):
+        points[at(mesh, x, 0), 0] = to
+    node = at(mesh, 5, 1)
+    points[node] = (4.5, 0.3)
+    _, after = surfaced(mesh, points, joining=True)
+    assert after[at(mesh, 5, 0)] == node
+    points[node] = (4.5, 0.7)
+    _, after = surfaced(mesh, points, joining=True)
+    assert after[at(mesh, 5, 0)] == at(mesh, 6, 0)
+
+
+def test_a_node_with_short_edges_leaves_the_outline():
+    """Of three in a row one: between others that leave, an edge could pass through what has left."""
+    mesh, points = lattice(10, 10), lattice(10, 10).nodes.copy()
+    row = [at(mesh, x, 0) for x in (3, 4, 5, 6, 7)]
+    points[row, 0] = 4.2, 4.6, 5.0, 5.4, 5.8
+    found, after = surfaced(mesh, points, joining=False)
+    left = [node for node in row if after[node] == INSIDE]
+    assert 1 <= len(left) <= 2
+    assert (found[left, 1] > 0.1).all()
+    np.testing.assert_array_equal(np.delete(found, left, axis=0), np.delete(points, left, axis=0))
+
+
+def test_cells_that_were_kept_elsewhere_are_renewed_alike():
+    """As after a checkpoint: stars are taken from tables."""
+    (mesh, flow), made = FLOWS["sheared"], triangulation(FLOWS["sheared"][0])
+    assert made.make(positions(mesh.nodes))
+    other = triangulation(mesh)
+    other.adopt(made.tables.corners, made.tables.node_cells)
+    for cells in (made, other):
+        assert cells.renew(positions(flow(mesh.nodes)))
+    assert bits(other) == bits(made)
+    assert other.wrapped == made.wrapped < 0.5 * len(mesh.nodes)
