@@ -114,8 +114,9 @@ class Remaking:
     def _renew(self, *, surfacing: bool) -> bool:
         """Find the cells that there should be, and whether they could be found."""
         triangulation, positions = self._triangulation, self._places()
-        if not triangulation.sound:
+        if not triangulation.sound or triangulation.generation != self.made:  # or the state is another one's
             triangulation.adopt(self._body.corners, self._body.node_cells)
+            triangulation.generation = self.made
         if surfacing:
             triangulation.surface(positions, self.joining)
         return triangulation.renew(positions)
@@ -135,6 +136,7 @@ class Remaking:
         launch(self._install, body.cell_mass, inputs)
         self._limit.refresh()
         self.made += 1
+        self._triangulation.generation = self.made
 
 
 @forward_kernel

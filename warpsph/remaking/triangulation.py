@@ -37,6 +37,7 @@ class Triangulation:
         surfacing: takes nodes onto it, and off it.
         tables: the cells, and those around each node.
         sound: whether there are cells to renew.
+        generation: for who uses them: which cells these are.
         wrapped: how many stars were wrapped when it was last made or renewed.
         kernels: all that it launches.
     """
@@ -52,7 +53,7 @@ class Triangulation:
         launcher: Launcher,
     ):
         n, device = len(outline.after), launcher.device
-        self._launcher, self.wrapped, self.sound, self._near = launcher, 0, False, near / reach
+        self._launcher, self.generation, self.wrapped, self.sound, self._near = launcher, 0, 0, False, near / reach
         self._looks = ((self._near, wrap_kernel(*MOST_NEAR)), (1.0, wrap_kernel(*MOST_FAR)))
         self._sites = Sites(outline, reach=reach, weight=weight, precision=precision, launcher=launcher)
         self._sorted = False
