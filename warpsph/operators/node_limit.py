@@ -35,17 +35,21 @@ class NodeLimit:
 
     def __init__(self, body: CellBody, clock: Clock):
         self._body, self.outdated, self.shrinkage = body, clock.new_flag(), 1.0
-        self._kernel = _rate_kernel(body.space, body.kind)
-        self._rate = wp.zeros(body.nodes.mass.shape[0], dtype=body.space.real, device=body.launcher.device)
+        kernels = _stiffness_kernel(body.space, body.kind), _rate_kernel(body.space, body.kind)
+        self._stiffen, self._kernel = kernels
+        self._stiffness, self._rate = (
+            wp.zeros(over.shape[0], dtype=body.space.real, device=body.launcher.device)
+            for over in (body.corners, body.nodes.mass)
+        )
         self._largest = LargestMagnitude(len(self._rate), body.space.precision, body.launcher)
         self._initial = 0.0  # not measured yet
-        self.kernels = (self._kernel, *self._largest.kernels)
+        self.kernels = (*kernels, *self._largest.kernels)
 
     def refresh(self) -> None:
         """Measure it in the present configuration, with the present cells."""
-        body = self._body
-        inputs = [body.corners, body.node_cells, body.nodes, self._rate]
-        body.launcher.launch(self._kernel, self._rate, inputs)
+        body, launch = self._body, self._body.launcher.launch
+        launch(self._stiffen, self._stiffness, [body.corners, body.nodes, self._stiffness])
+        launch(self._kernel, self._rate, [self._stiffness, body.node_cells, body.nodes, self._rate])
         fastest = self._largest.of(self._rate)
         self._initial = self._initial or fastest
         self.shrinkage = self._initial / max(fastest, self._initial)
@@ -54,20 +58,37 @@ class NodeLimit:
 
 
 @cache
+def _stiffness_kernel(space: Space, kind: CellKind):
+    """κ_T over ρ c_p² of each cell."""
+    real, shape, CellNodes = space.real, cell_shape(space, kind), cell_node_types(space)[1]
+    T = shape.weights
+
+    @forward_kernel
+    def stiffness(first: int, corners: wp.array2d(dtype=wp.int32), nodes: CellNodes, result: wp.array(dtype=real)):
+        c = first + wp.tid()
+        x = shape.Modes()
+        for k in range(wp.static(kind.corners)):
+            x += wp.outer(T[k], nodes.point[corners[c, k]].x)
+        B, volume, _ = shape.measure(x)
+        result[c] = space.algebra.largest(shape.spread(B)) / wp.abs(volume)
+
+    return stiffness
+
+
+@cache
 def _rate_kernel(space: Space, kind: CellKind):
     """ω_i over √(n ρ c_p²)."""
-    real, shape, CellNodes, place_of = (
+    real, CellNodes, place_of, per_corner = (
         space.real,
-        cell_shape(space, kind),
         cell_node_types(space)[1],
         corner_place(kind),
+        1.0 / kind.corners,
     )
-    T, per_corner = shape.weights, 1.0 / kind.corners
 
     @forward_kernel
     def rate(
         first: int,
-        corners: wp.array2d(dtype=wp.int32),
+        stiffness: wp.array(dtype=real),
         table: NodeCells,
         nodes: CellNodes,
         result: wp.array(dtype=real),
@@ -75,12 +96,8 @@ def _rate_kernel(space: Space, kind: CellKind):
         i = first + wp.tid()
         total = real(0.0)
         for entry in range(table.first[i], table.first[i + 1]):
-            c, _corner = place_of(entry, table)
-            x = shape.Modes()
-            for k in range(wp.static(kind.corners)):
-                x += wp.outer(T[k], nodes.point[corners[c, k]].x)
-            B, volume, _frame = shape.measure(x)
-            total += space.algebra.largest(shape.spread(B)) / wp.abs(volume)
+            c, _ = place_of(entry, table)
+            total += stiffness[c]
         result[i] = wp.sqrt(real(per_corner) * total / nodes.mass[i])
 
     return rate

@@ -7,7 +7,7 @@ from .exact import REACH, met_before, square, turn
 from .outline import INSIDE
 from .sight import seen_from
 from .sites import Site
-from .wrapping import Stars
+from .wrapping import Stars, neighbour
 
 
 @wp.func
@@ -49,7 +49,7 @@ def check(
             far = square(a.x, a.y) > wp.int64(REACH) * wp.int64(REACH)
             bad = bad or far or turn(a, b) <= wp.int64(0)
             if not bad and (closed or m + 2 < degree):
-                following = stars.row[i, (m + 2) % degree]
+                following = neighbour(i, m + 2, degree, stars)
                 c = seen_from(here, following, site[following])
                 if square(c.x, c.y) <= wp.int64(REACH) * wp.int64(REACH):
                     bad = turn(a, c) > wp.int64(0) and met_before(i, a, c, b)
@@ -76,7 +76,7 @@ def follow(
         if site[i].after != INSIDE:
             cells -= 1
         for m in range(cells):
-            a, b = stars.row[i, m], stars.row[i, (m + 1) % degree]
+            a, b = stars.row[i, m], neighbour(i, m + 1, degree, stars)
             if fresh[a] != 0:
                 missing = missing or not beside(b, i, a, stars, site)
             if fresh[b] != 0:

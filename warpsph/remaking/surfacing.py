@@ -15,7 +15,7 @@ from ..device.launching import Launcher
 from ..device.precision import Precision
 from .exact import hash_of
 from .outline import INSIDE, OutlineArrays
-from .wrapping import Stars
+from .wrapping import Stars, neighbour
 
 # Tangent of what the angle lacks to 180 degrees under which a node that joins sees an edge of one spacing; of one
 # twice as long four times as much.
@@ -90,7 +90,7 @@ def _find_kernel(precision: Precision):
         place = vector()
         if outline.after[i] == INSIDE and held[i] == 0:
             for k in range(degree):
-                a, b = stars.row[i, k], stars.row[i, (k + 1) % degree]
+                a, b = stars.row[i, k], neighbour(i, k + 1, degree, stars)
                 if outline.after[a] == b and held[a] + held[b] < 2:
                     start, end = positions[a] - x, positions[b] - x
                     ahead = -wp.dot(start, end)
@@ -125,7 +125,7 @@ def _join(first: int, onto: wp.array(dtype=wp.int32), stars: Stars, outline: Out
         for k in range(degree):
             if stars.row[i, k] == onto[i]:
                 outline.before[i] = onto[i]
-                outline.after[i] = stars.row[i, (k + 1) % degree]
+                outline.after[i] = neighbour(i, k + 1, degree, stars)
 
 
 @cache

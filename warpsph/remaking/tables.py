@@ -11,7 +11,7 @@ from ..device.launching import Launcher
 from ..state.cells import NodeCells
 from .outline import INSIDE
 from .sites import Site
-from .wrapping import Stars
+from .wrapping import Stars, neighbour
 
 
 class CellTables:
@@ -78,7 +78,7 @@ def _count(
     if cells == 0:
         lost[0] = 1
     for k in range(cells):
-        if i < wp.min(stars.row[i, k], stars.row[i, (k + 1) % stars.degree[i]]):
+        if i < wp.min(stars.row[i, k], neighbour(i, k + 1, stars.degree[i], stars)):
             own += 1
     owned[i] = own
     around[i] = cells
@@ -89,7 +89,7 @@ def _rank(owner: int, a: int, b: int, site: wp.array(dtype=Site), stars: Stars) 
     """Which of its owner's cells (owner, a, b) is, −1 if none."""
     rank, degree = wp.int32(0), stars.degree[owner]
     for k in range(_cells_of(owner, site, stars)):
-        p, q = stars.row[owner, k], stars.row[owner, (k + 1) % degree]
+        p, q = stars.row[owner, k], neighbour(owner, k + 1, degree, stars)
         if owner < wp.min(p, q):
             if p == a:
                 if q == b:
@@ -113,7 +113,7 @@ def _fill(
     i = first + wp.tid()
     degree, rank = stars.degree[i], wp.int32(0)
     for k in range(_cells_of(i, site, stars)):
-        a, b = stars.row[i, k], stars.row[i, (k + 1) % degree]
+        a, b = stars.row[i, k], neighbour(i, k + 1, degree, stars)
         place = wp.int32(0)
         if i < wp.min(a, b):
             cell = first_cell[i] + rank

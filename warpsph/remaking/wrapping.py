@@ -38,6 +38,14 @@ class Stars:
 
 
 @wp.func
+def neighbour(i: int, k: int, degree: int, stars: Stars) -> int:
+    """Neighbour k of node i, the first again after the last."""
+    if k < degree:
+        return stars.row[i, k]
+    return stars.row[i, k - degree]
+
+
+@wp.func
 def nearest(seen: wp.array(dtype=Seen), count: int) -> int:
     """Number of the nearest node, −1 without any: the one whose line of equal power, Λ/2|k| away, is."""
     found, least = wp.int32(-1), wp.float64(wp.inf)
