@@ -165,6 +165,7 @@ def noisy(kind, shape, poisson):
         "flat": lambda x, *y: (10.0 * x, *y),
         "leaning": lambda x, y, *z: (x + 2.0 * y, y, *z),
         "jittered": jittered,
+        "bent": lambda x, y, *z: (x + 0.48 * (-1.0) ** np.rint(x + y), y, *z),
         "quarter disc": lambda x, y, *z: (x * np.sqrt(1.0 - y**2 / 32.0), y * np.sqrt(1.0 - x**2 / 32.0), *z),
     }[shape]
     scene = Scene(
@@ -186,7 +187,7 @@ def kinetic_energy(simulation):
 SOLIDS, POISSON = ("quads", "triangles", "hexahedra", "tetrahedra"), (-0.5, 0.3, 0.49)
 
 
-@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "quarter disc"])
+@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "bent", "quarter disc"])
 @pytest.mark.parametrize("kind", SOLIDS)
 @pytest.mark.parametrize("poisson", POISSON)
 def test_noise_does_not_grow(kind, shape, poisson):
@@ -198,7 +199,7 @@ def test_noise_does_not_grow(kind, shape, poisson):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "quarter disc"])
+@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "bent", "quarter disc"])
 @pytest.mark.parametrize("kind", SOLIDS)
 @pytest.mark.parametrize("poisson", POISSON)
 def test_noise_does_not_grow_in_a_hundred_thousand_steps(kind, shape, poisson):

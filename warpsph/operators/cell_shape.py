@@ -35,6 +35,8 @@ class CellShape:
         Modes: Warp matrix of the modes of a vector, a row each.
         measure: Modes of x → (B_m in row m, A_T, ∇ξ_a in row a).
         spread: B → A_T² Σ_j ∇N_j ⊗ ∇N_j, of the linear modes.
+        bend: (Modes of x, ∇ξ_a) → b² = Σ (∇ξ_a · x_m)² over the links: of a parallelogram 0, as a corner folds
+            between ½ and 1.
     """
 
     modes: int
@@ -45,6 +47,7 @@ class CellShape:
     Modes: type
     measure: wp.Function
     spread: wp.Function
+    bend: wp.Function
 
 
 @cache
@@ -70,6 +73,7 @@ def cell_shape(space: Space, kind: CellKind) -> CellShape:
         Modes=space.mat(modes, d),
         measure=_measure(space, kind, axes),
         spread=_spread(space, weights),
+        bend=_bend(space, len(axes), links),
     )
 
 
@@ -150,3 +154,17 @@ def _spread(space: Space, weights: np.ndarray) -> wp.Function:
         return wp.transpose(linear) * shared * linear
 
     return spread
+
+
+def _bend(space: Space, modes: int, links: tuple[tuple[int, int, int], ...]) -> wp.Function:
+    real, tensor = space.real, space.types.tensor
+
+    @wp.func
+    def bend(x: space.mat(modes, space.dim), frame: tensor):
+        result = real(0.0)
+        for q in range(wp.static(len(links))):
+            share = wp.dot(x[wp.static(links[q][0])], frame[wp.static(links[q][1])])
+            result += share * share
+        return result
+
+    return bend
