@@ -23,9 +23,11 @@ from ..state.clock import FOLDED
 from .cell_numbers import tensors_of
 from .cell_shape import cell_shape
 
-# Where soil flows κ is FLOWING_SHARE (b/BENT)², at most FLOWING_SHARE, with b = 0 in a parallelogram and 1 where a
-# corner folds: with viscosity alone against it, flow bends a cell further and further until it does.
-FLOWING_SHARE, BENT = 2.0 / 3.0, 0.5
+# κ goes over to BENT_SHARE as (b/BENT)² goes to 1, with b = 0 in a parallelogram and 1 where a corner folds. Where
+# soil flows it is 0 without that, and with viscosity alone against it flow bends a cell further and further, until
+# it folds. Elastic cells that are not parallelepipeds need more than what bends a lattice's exactly: layers of a
+# bar of jittered hexahedra that spins with half of c_s at its rim drifted to and fro until they folded.
+BENT_SHARE, BENT = 2.0 / 3.0, 0.5
 
 
 def corner_share(sharpening: float) -> float:
@@ -81,8 +83,8 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
             for q in range(wp.static(len(shape.links))):
                 mode, axis = x[wp.static(shape.links[q][0])], frame[wp.static(shape.links[q][1])]
                 bent = wp.max(bent, wp.abs(wp.dot(mode, axis)) / real(BENT))
-            flowing = real(FLOWING_SHARE) * wp.min(bent * bent, real(1.0))
-            numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
+            bent = wp.min(bent * bent, real(1.0))
+            numbers[c, 2] = (real(1.0) - bent) * (elastic * real(corner_share)) + bent * real(BENT_SHARE)
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
