@@ -123,34 +123,6 @@ def test_a_free_body_keeps_momentum_angular_momentum_and_energy_in_two_turns(kin
     assert (mass[:, None] * simulation.field("velocity") ** 2).sum() == pytest.approx(start, rel=5e-3)
 
 
-@pytest.mark.parametrize("damping", [0.0, 20.0])
-@pytest.mark.parametrize("kind", ["quads", "triangles"])
-def test_soil_at_rest_stays_at_rest(kind, damping):
-    """A K0 column: linear stresses balance the weight exactly, damped or not."""
-    soil = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=2000.0)
-    k0 = 0.3 / 0.7
-
-    def at_rest(x, y):
-        down = -2000.0 * 9.81 * (1.0 - y)
-        return k0 * down, down, 0.0 * y, k0 * down
-
-    scene = Scene(
-        shape=Box((0.5, 1.0), 0.125, cells=BODIES[kind][1]),
-        material=soil,
-        conditions=[Fixed(edge("bottom")), Roller(edge("left")), Roller(edge("right"))],
-        body_force=BodyForce((0.0, -9.81)),
-        damping=damping,
-        stress=at_rest,
-        duration=5.0,
-        numerics=NUMERICS,
-    )
-    simulation = Simulation(scene, device="cpu")
-    simulation.run()
-    assert np.abs(simulation.field("velocity")).max() <= 1e-12 * 9.81 * 5.0
-    reaction = simulation.stepper.reactions.numpy()[:, 1]
-    assert reaction.sum() == pytest.approx(2000.0 * 9.81 * 0.5, rel=1e-10)
-
-
 def noisy(kind, shape, poisson):
     """A clamped body with random velocities."""
     dim, name = BODIES[kind]

@@ -195,7 +195,7 @@ def scene(p):
         conditions=[Fixed(edge("left"))],
         velocity=lambda x, y: (1e-3 * x, 0.0 * y),
         duration=2.0,
-        numerics=Numerics(velocity_scheme="cells", courant=0.85),
+        numerics=Numerics(velocity_scheme="cells"),
     )
 '''
 
@@ -250,7 +250,6 @@ def test_noise_of_every_node_is_no_alarm():
     """White noise at the longest step, of which viscosity takes nearly all: the worst that a stable run can do."""
     rng = np.random.default_rng(1)
     noise = scene(
-        0.85,
         shape=Box((1.0,) * 3, 0.25),
         velocity=lambda *x: tuple(1e-3 * rng.normal(size=(3, len(x[0])))),
         conditions=[Roller(edge("bottom"))],

@@ -24,10 +24,12 @@ from ..state.clock import FOLDED
 from .cell_numbers import tensors_of
 from .cell_shape import cell_shape
 
-# Where soil flows κ is FLOWING_SHARE in a parallelogram and grows with (b/BENT)², up to 1 where a corner folds, to
-# MOST_SHARE at most. With viscosity alone against it, flow bends a cell further and further: the free surface
-# beside a footing gets saw-toothed, and cells fold.
-FLOWING_SHARE, MOST_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
+# κ goes over to BENT_SHARE as (b/BENT)² goes to 1, with b = 0 in a parallelogram and up to 1 where a corner folds;
+# without that it is FLOWING_SHARE where soil flows. With viscosity alone against it, flow bends a cell further and
+# further: the free surface beside a footing gets saw-toothed, and cells fold. Elastic cells that are not
+# parallelepipeds need more than what bends a lattice's exactly: layers of a bar of jittered hexahedra that spins
+# with half of c_s at its rim drifted to and fro until they folded.
+FLOWING_SHARE, BENT_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
 ROUGH = 0.1  # of q: the most that viscosity adds to the stress of a cell that flows
 
 
@@ -81,8 +83,8 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             bent = wp.min(bend(x, frame) / (real(BENT) * real(BENT)), real(1.0))
-            flowing = wp.lerp(real(FLOWING_SHARE), real(MOST_SHARE), bent)
-            numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
+            straight = elastic * real(corner_share) + flowed * real(FLOWING_SHARE)
+            numbers[c, 2] = wp.lerp(straight, real(BENT_SHARE), bent)
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
