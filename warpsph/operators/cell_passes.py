@@ -44,6 +44,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     per_corner, T, (_, put_tensor) = 1.0 / kind.corners, shape.weights, tensors_of(space)
+    joined, d = shape.joined, space.dim
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers = packed(wp.array2d(dtype=real))
 
@@ -78,18 +79,20 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             bent = real(0.0)
-            for q in range(wp.static(len(shape.links))):
-                mode, axis = x[wp.static(shape.links[q][0])], frame[wp.static(shape.links[q][1])]
-                bent = wp.max(bent, wp.abs(wp.dot(mode, axis)) / real(BENT))
+            for p in range(wp.static(shape.partial)):
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        bent = wp.max(bent, wp.abs(wp.dot(x[m], frame[a])) / real(BENT))
             flowing = real(FLOWING_SHARE) * wp.min(bent * bent, real(1.0))
             numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
-                for q in range(wp.static(len(shape.links))):
-                    if wp.static(shape.links[q][2] == p):
-                        bend = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
-                        part += wp.outer(bend, frame[wp.static(shape.links[q][1])])
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        part += wp.outer(v[m] - G * x[m], frame[a])
                 put_tensor(c, 1 + p, share * part, numbers)
 
     return strain
@@ -101,7 +104,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
     real, types, n = space.real, space.types, kind.corners
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     T, per_corner, size = shape.weights, 1.0 / kind.corners, space.continuum.stress_size
-    sign, (tensor_at, _) = shape.signs, tensors_of(space)
+    sign, joined, (tensor_at, _), d = shape.signs, shape.joined, tensors_of(space), space.dim
     Parts = space.mat(max(1, shape.partial), size)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers, packed_forces = packed(wp.array2d(dtype=real)), packed(wp.array2d(dtype=types.vector))
@@ -168,12 +171,13 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                     rough, part, material.lame, material.shear, material.young
                 )
             bent = types.tensor()
-            for q in range(wp.static(len(shape.links))):
-                pull = share * space.stress.traction(
-                    W[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]
-                )
-                F[wp.static(shape.links[q][0])] += pull
-                bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
+            for p in range(wp.static(shape.partial)):
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        pull = share * space.stress.traction(W[p], frame[a])
+                        F[m] += pull
+                        bent += wp.outer(pull, x[m])
             bent = bent / volume
             for m in range(wp.static(shape.modes)):
                 F[m] -= bent * B[m]
