@@ -13,6 +13,7 @@ from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
 from warpsph.state.cells import cell_table
 from warpsph.state.nodes import auxiliary_nodes
+from warpsph.step.cells import spacing
 
 every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
@@ -200,6 +201,24 @@ def test_least_distance_of_right_triangles():
         mesh = Box((3.0, 2.0), 1.0, cells="triangles", diagonals=diagonals).mesh()
         assert np.allclose(mesh.cell_stretches, [2.0**0.5, (2.0 / 3.0) ** 0.5])
         assert mesh.smallest_distance() == pytest.approx((2.0 / 3.0) ** 0.5)
+
+
+@every_kind
+def test_spacing_of_the_time_step_follows_from_the_gradients_of_every_cell(kind):
+    """2/(√n |∇N|), |·| the largest singular value: the fastest waves a cell knows (`operators/cell_limit.py`)."""
+    mesh = shaken(kind)
+    gradients = np.array(kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
+    largest = [np.linalg.norm(cell, 2) for cell in gradients]
+    assert spacing(mesh) == pytest.approx(2.0 / (np.sqrt(kind.corners) * max(largest)), rel=1e-12)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_one_cell_unlike_the_others_of_a_lattice_is_seen(dim):
+    lattice = Box((1.0,) * dim, 0.25).mesh()
+    assert np.allclose(lattice.cell_stretches, 0.25, rtol=1e-12)
+    nodes = lattice.nodes.copy()
+    nodes[-1, 0] -= 1e-6
+    assert lattice.with_nodes(nodes).smallest_distance() < 0.25 - 1e-7
 
 
 @pytest.mark.parametrize("kind", [TRIANGLE, QUAD], ids=lambda kind: kind.name)

@@ -131,10 +131,13 @@ class CellStepper(Stepper):
 
 
 def spacing(mesh: Mesh) -> float:
-    """Least 2 c_p/ω_T of the cells [m], see `warpsph.operators.cell_limit`: of a lattice its spacing."""
-    gradients = np.array(mesh.kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
-    largest = np.linalg.norm(gradients, 2, axis=(1, 2)).max()
-    return float(2.0 / (np.sqrt(mesh.kind.corners) * largest))
+    """Least 2 c_p/ω_T of the cells [m], see `warpsph.operators.cell_limit`: of a lattice its spacing.
+
+    It follows from the least of a cell's stretches: Σ_j ∇N_j ⊗ ∇N_j of a regular cell is alike in every direction.
+    """
+    kind = mesh.kind
+    regular = np.linalg.norm(np.array(kind.gradients) @ np.linalg.inv(kind.regular), 2)
+    return float(2.0 * mesh.smallest_distance() / (np.sqrt(kind.corners) * regular))
 
 
 # Beside free edges of nearly incompressible bodies waves grow from somewhere between 0.85 and 0.9 on, without
