@@ -241,7 +241,11 @@ class Mesh:
         return np.bincount(self.cells.ravel(), np.repeat(values, self.kind.corners), len(self.nodes))
 
     def face_normals(self) -> np.ndarray:
-        """Outward unit normal of each boundary face, shape (f, d)."""
+        """Outward unit normal of each boundary face, shape (f, d). Read only."""
+        return self._normals
+
+    @cached_property
+    def _normals(self) -> np.ndarray:
         points = self.nodes[self.faces]
         outward = points.mean(axis=1) - self.nodes[self.cells[self.face_cell]].mean(axis=1)
         if self.dim == 1:
@@ -252,7 +256,9 @@ class Mesh:
         else:
             normals = self._twice_face_areas(points)
         normals = normals * np.sign(np.sum(normals * outward, axis=1, keepdims=True))
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals.flags.writeable = False
+        return normals
 
     def face_areas(self) -> np.ndarray:
         """Area of each boundary face [mᵈ⁻¹], shape (f,): 1 at the ends of a bar."""
