@@ -148,31 +148,6 @@ def test_volumes_are_those_that_faces_enclose(kind):
     assert np.allclose(mesh.cell_volumes(), enclosed, rtol=1e-12)
 
 
-@every_kind
-def test_gradients_of_corners_are_how_volumes_follow_them(kind):
-    """A volume is linear in each coordinate of each corner, so that differences are exact."""
-    mesh = shaken(kind)
-    found = mesh.corner_gradients() * mesh.cell_volumes()[:, None, None]
-    cell, step = len(mesh.cells) // 2, 0.03
-    for corner, axis in itertools.product(range(kind.corners), range(kind.dim)):
-        volumes = []
-        for side in (step, -step):
-            nodes = mesh.nodes.copy()
-            nodes[mesh.cells[cell, corner], axis] += side
-            volumes.append(mesh.with_nodes(nodes).cell_volumes()[cell])
-        slope = (volumes[0] - volumes[1]) / (2.0 * step)
-        assert found[cell, corner, axis] == pytest.approx(slope, abs=1e-12 * 0.25 ** (kind.dim - 1))
-
-
-@every_kind
-def test_gradients_of_corners_are_exact_for_linear_fields_and_hold_each_other(kind):
-    mesh = shaken(kind)
-    gradients = mesh.corner_gradients()
-    assert np.allclose(gradients.sum(axis=1), 0.0, atol=1e-11)
-    ones = np.einsum("mci,mcj->mij", mesh.nodes[mesh.cells], gradients)
-    assert np.allclose(ones, np.eye(kind.dim), atol=1e-11)
-
-
 def test_volumes_by_the_middle_differ_in_warped_hexahedra_only():
     for kind in KINDS.values():
         mesh = shaken(kind)

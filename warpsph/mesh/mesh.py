@@ -140,19 +140,6 @@ class Mesh:
         """How the corners of a hexahedron follow its first modes, ∂²x/∂ξ_a∂ξ_b in the middle [m], (3, m, 3)."""
         return self._corner_sums(0.5 * self.kind.signs[:, :3])
 
-    def corner_gradients(self) -> np.ndarray:
-        """Mean of ∇N_j over each cell [1/m], shape (m, c, d).
-
-        Times the cell's volume it is ∂V/∂x_j, how its volume follows each corner (Flanagan and Belytschko 1981),
-        exactly for cells of any shape; Σ_j ∇N_j = 0 and Σ_j x_j ∇N_j = 1.
-        """
-        volume, total = 0.0, 0.0
-        for weight, slopes in self.kind.rule:
-            jacobians = self.cell_jacobians(slopes)
-            part = weight * determinants(jacobians)
-            volume, total = volume + part, total + part[:, None, None] * (slopes @ np.linalg.inv(jacobians))
-        return total / volume[:, None, None]
-
     def cell_jacobians(self, slopes: np.ndarray | None = None) -> np.ndarray:
         """∂x/∂ξ at one place of each cell [m], the axes as columns, shape (m, d, d).
 
