@@ -39,7 +39,7 @@ def corner_share(sharpening: float) -> float:
 
 
 @cache
-def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float):
+def strain_kernel(space: Space, kind: CellKind, flows: bool):
     """Of each cell, at the half step: A/n, e_T, (A/n) G v, and what its hourglass modes add to it."""
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
@@ -51,6 +51,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
     @forward_kernel
     def strain(
         first: int,
+        kappa: real,
         corners: wp.array2d(dtype=wp.int32),
         nodes: CellNodes,
         numbers: wp.array2d(dtype=real),
@@ -85,7 +86,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
                     if m >= 0:
                         bent = wp.max(bent, wp.abs(wp.dot(x[m], frame[a])) / real(BENT))
             flowing = real(FLOWING_SHARE) * wp.min(bent * bent, real(1.0))
-            numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
+            numbers[c, 2] = elastic * kappa + flowed * flowing
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()

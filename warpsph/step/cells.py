@@ -62,10 +62,10 @@ class CellStepper(Stepper):
         self.loads = LoadedFaces(body, clock, len(driven))
         self._limit = CellLimit(body, clock)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
-        kind, slots, share = body.kind, body.slots, corner_share(c)
+        kind, slots, self._kappa = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
-        self._strain = strain_kernel(space, kind, body.law.flows, share)
+        self._strain = strain_kernel(space, kind, body.law.flows)
         self._rate = rate_kernel(space, kind, slots)
         self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=sharpening.on)
         self._force = force_kernel(space, kind, body.law, sharpening.on)
@@ -124,7 +124,7 @@ class CellStepper(Stepper):
         nodes, points, corners = body.nodes, body.nodes.point, body.corners
         inputs = [self.conditions, body.scene.damping, clock.time_step, nodes]
         launch(self._kick, points, inputs, gathers=False)
-        launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
+        launch(self._strain, corners, [self._kappa, corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
         self._sharpening.weigh()
