@@ -192,15 +192,18 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
             raise SceneError(f"conditions[{index}]", condition, "its selection must hold at least one node")
         covered.append(condition.faces(mesh))
         given = getattr(condition, "normal", None)
+        everywhere = () if condition.rigid else None if given is None else (given,)  # rigid: however faces look
         own = np.repeat(faces, corners)
         edge = (np.repeat(unmoved, corners) if condition.unmoved else own).tolist()
         known: dict[tuple, tuple] = {}  # most nodes have faces around them like those of some other node
         for node in np.flatnonzero(condition.nodes(mesh)).tolist():
-            around = [place for place in places[first[node] : first[node + 1]] if edge[place]]
-            key = tuple((alike[place], bool(own[place])) for place in around)
-            if given is None and key not in known:
-                known[key] = _smooth_normals(normals_at[around], angles[around], own[around])
-            normals = known[key] if given is None else (given,)
+            normals = everywhere
+            if normals is None:
+                around = [place for place in places[first[node] : first[node + 1]] if edge[place]]
+                key = tuple((alike[place], bool(own[place])) for place in around)
+                if key not in known:
+                    known[key] = _smooth_normals(normals_at[around], angles[around], own[around])
+                normals = known[key]
             if not normals and condition.takes_normal:
                 raise SceneError(
                     f"conditions[{index}]",
