@@ -9,6 +9,7 @@ from warpsph import Box, Elastic, Numerics, Scene, SceneError, Shape
 from warpsph.device.precision import PRECISIONS
 from warpsph.mesh.kinds import GRID_KINDS, HEXAHEDRON, KINDS, QUAD, SEGMENT, TETRAHEDRON, TRIANGLE
 from warpsph.mesh.mesh import Mesh
+from warpsph.mesh.small_matrices import determinants, least_singular_values
 from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
 from warpsph.state.cells import cell_table
@@ -167,15 +168,28 @@ def test_stretches_do_not_depend_on_which_corner_is_the_first(kind):
     turns = [kind.mirrored] if kind.grid else list(itertools.permutations(range(kind.corners)))
     for turn in turns:
         other = Mesh(**(vars(shaken(kind)) | {"cells": mesh.cells[:, turn]}))
-        assert np.allclose(other.cell_stretches, mesh.cell_stretches, rtol=1e-10)
+        assert np.allclose(other.least_stretches(), mesh.least_stretches(), rtol=1e-10)
 
 
 def test_least_distance_of_right_triangles():
-    """Legs 1: the map from a regular triangle has singular values √2 and √(2/3); from cell to cell the same."""
+    """Legs 1: the map from a regular triangle has singular values √2 and √(2/3), in every cell."""
     for diagonals in ("rising", "falling", "alternating"):
         mesh = Box((3.0, 2.0), 1.0, cells="triangles", diagonals=diagonals).mesh()
-        assert np.allclose(mesh.cell_stretches, [2.0**0.5, (2.0 / 3.0) ** 0.5])
+        assert np.allclose(mesh.least_stretches(), (2.0 / 3.0) ** 0.5)
         assert mesh.smallest_distance() == pytest.approx((2.0 / 3.0) ** 0.5)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_small_matrices_against_lapack(dim):
+    """Of any kind, of rotations, of those with equal singular values, and of flat ones."""
+    random = np.random.default_rng(dim)
+    matrices = random.normal(size=(300, dim, dim))
+    matrices[:50] = np.linalg.qr(matrices[:50])[0]
+    matrices[50:60] *= np.array([2.0, 2.0, 1e-4])[:dim]
+    matrices[60:70] = np.diag([2.0, 1.0, 1.0][:dim])
+    assert determinants(matrices) == pytest.approx(np.linalg.det(matrices), rel=1e-11)
+    least = np.linalg.svd(matrices, compute_uv=False)[:, -1]
+    assert least_singular_values(matrices) == pytest.approx(least, rel=1e-11)
 
 
 @every_kind
@@ -190,7 +204,7 @@ def test_spacing_of_the_time_step_follows_from_the_gradients_of_every_cell(kind)
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_one_cell_unlike_the_others_of_a_lattice_is_seen(dim):
     lattice = Box((1.0,) * dim, 0.25).mesh()
-    assert np.allclose(lattice.cell_stretches, 0.25, rtol=1e-12)
+    assert np.allclose(lattice.least_stretches(), 0.25, rtol=1e-12)
     nodes = lattice.nodes.copy()
     nodes[-1, 0] -= 1e-6
     assert lattice.with_nodes(nodes).smallest_distance() < 0.25 - 1e-7

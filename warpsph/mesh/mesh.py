@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import SceneError, one_of
 from .continuum import CONTINUA, Continuum
 from .kinds import KINDS, CellKind
+from .small_matrices import determinants, least_singular_values
 
 NO_SIDE = -1
-ALIKE = 1e-12  # spacings: cells whose Jacobians differ by no more have one shape and size
 ARRAYS = ("spacing", "nodes", "cells", "faces", "face_cell", "face_side")  # attributes of a mesh, but its tags
 
 
@@ -27,18 +27,6 @@ def kind_of(dim: int, corners: int) -> CellKind:
         known = one_of(f"{kind.name} ({kind.dim}D, {kind.corners})" for kind in KINDS.values())
         raise SceneError("cells", f"{corners} corners in {dim}D", known)
     return KINDS[dim, corners]
-
-
-def determinants(matrices: np.ndarray) -> np.ndarray:
-    """Determinants of small matrices (m, d, d), d at most 3, shape (m,): quicker than NumPy's, one by one."""
-    rows = matrices.transpose(1, 2, 0)
-    if len(rows) == 1:
-        return rows[0, 0].copy()
-    if len(rows) == 2:
-        (a, b), (c, d) = rows
-        return a * d - b * c
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
 @dataclass(frozen=True)
@@ -188,27 +176,25 @@ class Mesh:
         squares = [np.sum((corners[:, b] - corners[:, a]) ** 2, axis=0).max() for a, b in self.kind.edges]
         return float(np.sqrt(max(squares)))
 
+    def smallest_distance(self) -> float:
+        """Least distance across a cell [m], which a wave sees: the least of `least_stretches`.
+
+        In a cell that leans it is less than the distance between the middles of opposite faces.
+        """
+        return self._smallest_distance
+
     @cached_property
-    def cell_stretches(self) -> np.ndarray:
-        """Lengths of each cell along its principal axes [m], longest first, shape (m, d).
+    def _smallest_distance(self) -> float:
+        return float(self.least_stretches().min())
+
+    def least_stretches(self) -> np.ndarray:
+        """Least of the lengths of each cell along its principal axes [m], shape (m,).
 
         They are the singular values of the map from a cell with edges of length 1, all alike: from a square or a
         cube, or from a regular triangle or tetrahedron, and so do not depend on which corner is the first.
         """
         jacobians = self.cell_jacobians()
-        if np.abs(jacobians - jacobians[0]).max() <= ALIKE * self.spacing:  # as in a lattice: one stands for all
-            jacobians = jacobians[:1]
-        if not self.kind.grid:
-            jacobians = jacobians @ np.linalg.inv(self.kind.regular)
-        found = np.linalg.svd(jacobians, compute_uv=False)
-        return np.broadcast_to(found, (len(self.cells), self.dim))
-
-    def smallest_distance(self) -> float:
-        """Least distance across a cell [m], which a wave sees: the least of `cell_stretches`.
-
-        In a cell that leans it is less than the distance between the middles of opposite faces.
-        """
-        return float(self.cell_stretches.min())
+        return least_singular_values(jacobians if self.kind.grid else jacobians @ np.linalg.inv(self.kind.regular))
 
     def node_volumes(self) -> np.ndarray:
         """Volume of each node [mᵈ], shape (n,): an equal share of each adjacent cell, so that masses add up."""
