@@ -44,17 +44,19 @@ def corner_share(sharpening: float) -> float:
 
 
 @cache
-def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float):
+def strain_kernel(space: Space, kind: CellKind, flows: bool):
     """Of each cell, at the half step: A/n, e_T, (A/n) G v, and what its hourglass modes add to it."""
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     per_corner, T, bend, (_, put_tensor) = 1.0 / kind.corners, shape.weights, shape.bend, tensors_of(space)
+    joined, d = shape.joined, space.dim
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers = packed(wp.array2d(dtype=real))
 
     @forward_kernel
     def strain(
         first: int,
+        kappa: real,
         corners: wp.array2d(dtype=wp.int32),
         nodes: CellNodes,
         numbers: wp.array2d(dtype=real),
@@ -83,15 +85,15 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             bent = wp.min(bend(x, frame) / (real(BENT) * real(BENT)), real(1.0))
-            straight = elastic * real(corner_share) + flowed * real(FLOWING_SHARE)
+            straight = elastic * kappa + flowed * real(FLOWING_SHARE)
             numbers[c, 2] = wp.lerp(straight, real(BENT_SHARE), bent)
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
-                for q in range(wp.static(len(shape.links))):
-                    if wp.static(shape.links[q][2] == p):
-                        rest = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
-                        part += wp.outer(rest, frame[wp.static(shape.links[q][1])])
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        part += wp.outer(v[m] - G * x[m], frame[a])
                 put_tensor(c, 1 + p, share * part, numbers)
 
     return strain
@@ -103,7 +105,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
     real, types, n = space.real, space.types, kind.corners
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     T, per_corner, size = shape.weights, 1.0 / kind.corners, space.continuum.stress_size
-    sign, bend, (tensor_at, _) = shape.signs, shape.bend, tensors_of(space)
+    sign, joined, bend, (tensor_at, _), d = shape.signs, shape.joined, shape.bend, tensors_of(space), space.dim
     Parts = space.mat(max(1, shape.partial), size)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers, packed_forces = packed(wp.array2d(dtype=real)), packed(wp.array2d(dtype=types.vector))
@@ -186,12 +188,13 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                     rough, part, material.lame, material.shear, material.young
                 )
             bent = types.tensor()
-            for q in range(wp.static(len(shape.links))):
-                pull = share * space.stress.traction(
-                    W[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]
-                )
-                F[wp.static(shape.links[q][0])] += pull
-                bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
+            for p in range(wp.static(shape.partial)):
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        pull = share * space.stress.traction(W[p], frame[a])
+                        F[m] += pull
+                        bent += wp.outer(pull, x[m])
             bent = bent / volume
             for m in range(wp.static(shape.modes)):
                 F[m] -= bent * B[m]

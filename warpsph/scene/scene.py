@@ -131,7 +131,7 @@ class Scene:
         if self.free_surface is not None:
             self._check_free_surface()
         self.numerics.scheme.check_cells(self.mesh)
-        self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
+        self.numerics.check_support(self.mesh)
         self._check_loads()
         self.output.check(self)
         check_thickness(self.mesh, self.boundary, self._freed_nodes())

@@ -62,10 +62,10 @@ class CellStepper(Stepper):
         self.loads = LoadedFaces(body, clock, len(driven))
         self._limit = CellLimit(body, clock)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
-        kind, slots, share = body.kind, body.slots, corner_share(c)
+        kind, slots, self._kappa = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
-        self._strain = strain_kernel(space, kind, body.law.flows, share)
+        self._strain = strain_kernel(space, kind, body.law.flows)
         self._rate = rate_kernel(space, kind, slots)
         self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=sharpening.on)
         self._force = force_kernel(space, kind, body.law, sharpening.on)
@@ -124,7 +124,7 @@ class CellStepper(Stepper):
         nodes, points, corners = body.nodes, body.nodes.point, body.corners
         inputs = [self.conditions, body.scene.damping, clock.time_step, nodes]
         launch(self._kick, points, inputs, gathers=False)
-        launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
+        launch(self._strain, corners, [self._kappa, corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
         self._sharpening.weigh()
@@ -135,17 +135,19 @@ def spacing(mesh: Mesh) -> float:
 
     In space 0.975 of it. ω_T is that of a wave along one direction; a free body two cells thick that is nearly
     incompressible swells along three at once: waves of 3 × 2 × 2 cubes grow from a Courant number of 0.785 on.
+    Σ_j ∇N_j ⊗ ∇N_j of a regular cell is alike in every direction: what counts is the least of a cell's stretches.
     """
-    kind, inverse = mesh.kind, np.linalg.inv(mesh.cell_jacobians())
-    gradients = np.array(kind.gradients) @ inverse
-    largest = np.linalg.norm(gradients, 2, axis=(1, 2)) ** 2
+    kind = mesh.kind
+    regular = np.linalg.norm(np.array(kind.gradients) @ np.linalg.inv(kind.regular), 2)
+    distance = mesh.smallest_distance()
     if kind.modes:
-        twists = np.einsum("ck,mci->mki", kind.signs, mesh.nodes[mesh.cells]) / kind.corners
-        links = [(mode, axis) for mode, axes in enumerate(kind.modes) for axis in axes]
-        bend = sum((2.0 * (inverse[:, a] * twists[:, m]).sum(axis=1)) ** 2 for m, a in links)
-        share = BENT_SHARE * np.minimum(bend / BENT**2, 1.0)
-        largest = largest + share**2 * (1.0 + bend) * (gradients**2).sum(axis=(1, 2))
-    return float((0.975 if mesh.dim == 3 else 1.0) * 2.0 / np.sqrt(kind.corners * largest.max()))
+        bent, bends, gradients = mesh.bent_cells()
+        if len(bent):
+            share = BENT_SHARE * np.minimum(bends / BENT**2, 1.0)
+            more = share**2 * (1.0 + bends) * (gradients**2).sum(axis=(1, 2))
+            stretches = mesh.least_stretches()[bent]
+            distance = min(distance, (stretches / np.sqrt(1.0 + more * (stretches / regular) ** 2)).min())
+    return float((0.975 if mesh.dim == 3 else 1.0) * 2.0 * distance / (np.sqrt(kind.corners) * regular))
 
 
 COURANT_LIMIT = 0.8  # tests/test_stability.py
