@@ -142,6 +142,14 @@ class Mesh:
         slopes = np.array(self.kind.gradients if slopes is None else slopes, dtype=float).T  # float64, always
         return np.stack([sum(g * x for g, x in zip(axis, corners, strict=True)) for axis in slopes], axis=2)
 
+    def corner_volumes(self) -> np.ndarray:
+        """det ∂x/∂ξ at the corners of each cell [mᵈ], shape (m, c), of a simplex one for all, (m, 1).
+
+        Where one is not above 0 the cell is flat or folded, although it may have a volume as a whole.
+        """
+        places = self.kind.points if self.kind.grid else self.kind.points[:1]
+        return np.stack([np.linalg.det(self.cell_jacobians(self.kind.slopes(place))) for place in places], axis=1)
+
     @cached_property
     def _inverse_jacobians(self) -> np.ndarray:
         return np.linalg.inv(self.cell_jacobians())
