@@ -254,6 +254,29 @@ def test_history_is_read_up_to_its_last_whole_line(tmp_path):
     np.testing.assert_array_equal(columns["load at top"], [1.5, 2.5])
 
 
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("step [-],load [N]", "does not begin with step and time"),
+        ("step [-],time [s],load", "have no name"),
+        ("step [-],time [s],load [N],load [N]", "one name"),
+        ("step [-],time [s],energy.kinetic [J],energy.elastic [J]", "not those of a balance"),
+        ("step [-],time [s],load [N],force [N]", "not of one length"),
+    ],
+)
+def test_history_with_other_columns_than_are_written_is_refused(header, message, tmp_path):
+    (tmp_path / "history.csv").write_text(f"{header}\n0,0.0,1.5\n")
+    with pytest.raises(DamagedError, match=message):
+        read_history(tmp_path / "history.csv")
+
+
+def test_what_is_quoted_of_a_damaged_file_is_one_line_of_some_length(tmp_path):
+    (tmp_path / "history.csv").write_text(f"step [-],time [s]\n0,{'x' * 5000}\n")
+    with pytest.raises(DamagedError, match="could not convert string to float") as caught:
+        read_history(tmp_path / "history.csv")
+    assert len(str(caught.value)) < 600
+
+
 @pytest.fixture(scope="module")
 def framed(tmp_path_factory):
     """The folder of a run with frames."""
