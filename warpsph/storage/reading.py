@@ -35,7 +35,7 @@ def reading(kind: str, path: Path, damaged: str = "it can not be read ({error})"
     except MemoryError:
         raise DamagedError(kind, str(path), damaged.format(error="it is too large for the memory")) from None
     except Exception as error:  # reading damaged bytes may raise anything
-        what = " ".join(str(error).split()) or type(error).__name__  # it may quote what was read, of any length
+        what = str(error) or type(error).__name__  # it may quote what was read, of any length
         what = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
         raise DamagedError(kind, str(path), damaged.format(error=what)) from None
 
