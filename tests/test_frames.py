@@ -1,7 +1,10 @@
 """The frame store: what it keeps, when, and what is left of it after a run dies or goes on."""
 
+import io
 import json
 import shutil
+import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -33,6 +36,7 @@ from warpsph.export.quantity import quantity
 from warpsph.export.walls import WallMesh, walls_of
 from warpsph.frames import Frames, FrameWriter, evenly
 from warpsph.simulation.history import read_history
+from warpsph.storage.reading import read_arrays
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -275,6 +279,19 @@ def test_what_is_quoted_of_a_damaged_file_is_one_line_of_some_length(tmp_path):
     with pytest.raises(DamagedError, match="could not convert string to float") as caught:
         read_history(tmp_path / "history.csv")
     assert len(str(caught.value)) < 600
+
+
+def test_python_warns_of_nothing_in_a_damaged_file(tmp_path):
+    """NumPy reads an array's form as Python does, which would warn of it on standard error."""
+    array = io.BytesIO()
+    np.save(array, np.zeros(1))
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("values.npy", array.getvalue().replace(b"(1,)", b"1or 1"))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with pytest.raises(DamagedError):
+            read_arrays("frame", tmp_path / "a.npz")
+    assert not said
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import hashlib
 import json
 import stat
 import sys
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -25,9 +26,11 @@ LONGEST = 300  # letters, of what an error may say
 
 @contextlib.contextmanager
 def reading(kind: str, path: Path, damaged: str = "it can not be read ({error})") -> Iterator[None]:
-    """Turn all that damaged bytes may raise into one line that names the file."""
+    """Turn all that damaged bytes may raise into one line that names the file; libraries warn of nothing."""
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     except WarpSPHError:
         raise
     except FileNotFoundError:
