@@ -311,6 +311,7 @@ def framed(tmp_path_factory):
         ("000001.npz", "stress", nan, "stress is not finite everywhere"),
         ("000001.npz", "time", lambda v: v - 1.0, "its time is below 0"),
         ("body.npz", "nodes", nan, "nodes is not finite everywhere"),
+        ("body.npz", "nodes", lambda v: 0.0 * v, "a cell has no volume"),
         ("body.npz", "cells", out_of_range, "cells leads out of its table"),
         ("body.npz", "cells", lambda v: v[:, :2].copy(), r"\(2, 2\)"),
         ("body.npz", "faces", out_of_range, "faces leads out of its table"),
