@@ -107,7 +107,9 @@ def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
         require(len(cells) > 0, "it has no cells")
         held = [check_indices(f"wall_{k}", arrays[f"wall_{k}"], len(faces)) for k in range(walls)]
         require(all(wall.ndim == 1 and wall.size for wall in held), "a wall has no faces")
-    return Mesh(**parts | {"spacing": spacing}), held
+        mesh = Mesh(**parts | {"spacing": spacing})
+        require(bool((mesh.middle_volumes() > 0.0).all()), "a cell has no volume")
+    return mesh, held
 
 
 def frame_paths(run: Path) -> list[Path]:

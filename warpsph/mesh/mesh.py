@@ -154,6 +154,14 @@ class Mesh:
         corners = [self.nodes[corner] for corner in self.cells.T]
         return np.array([sum(w * x for w, x in zip(column, corners, strict=True)) for column in weights.T])
 
+    def corner_volumes(self) -> np.ndarray:
+        """det ∂x/∂ξ at the corners of each cell [mᵈ], shape (m, c), of a simplex one for all, (m, 1).
+
+        Where one is not above 0 the cell is flat or folded, although it may have a volume as a whole.
+        """
+        places = self.kind.points if self.kind.grid else self.kind.points[:1]
+        return np.stack([np.linalg.det(self.cell_jacobians(self.kind.slopes(place))) for place in places], axis=1)
+
     @cached_property
     def _inverse_jacobians(self) -> np.ndarray:
         return np.linalg.inv(self.cell_jacobians())
