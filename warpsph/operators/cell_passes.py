@@ -6,7 +6,8 @@ nodal force is its exact adjoint. What L does not see, G_p v − L_i, all the wa
 viscosity, no smooth motion does.
 
 Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening
-of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow.
+of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow. Bent
+cells lose both too, and get another κ for it.
 """
 
 from functools import cache
@@ -23,10 +24,10 @@ from ..state.clock import FOLDED
 from .cell_numbers import tensors_of
 from .cell_shape import cell_shape
 
-# κ goes over to BENT_SHARE as (b/BENT)² goes to 1, with b = 0 in a parallelogram and 1 where a corner folds. Where
-# soil flows it is 0 without that, and with viscosity alone against it flow bends a cell further and further, until
-# it folds. Elastic cells that are not parallelepipeds need more than what bends a lattice's exactly: layers of a
-# bar of jittered hexahedra that spins with half of c_s at its rim drifted to and fro until they folded.
+# As β = (b/BENT)² goes to 1, with b = 0 in a parallelogram and 1 where a corner folds, a cell goes over to
+# BENT_SHARE and no sharpening. Where soil flows κ is 0 without that, and with viscosity alone against it flow
+# bends a cell further and further, until it folds. In elastic bodies layers of a bar of jittered hexahedra,
+# spinning with half of c_s at its rim, drifted to and fro until they folded; sharpened cells with that κ grow.
 BENT_SHARE, BENT = 2.0 / 3.0, 0.5
 
 
@@ -76,7 +77,6 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
         elastic = real(1.0) - flowed
-        numbers[c, 1] = elastic
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             bent = real(0.0)
@@ -84,7 +84,8 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
                 mode, axis = x[wp.static(shape.links[q][0])], frame[wp.static(shape.links[q][1])]
                 bent = wp.max(bent, wp.abs(wp.dot(mode, axis)) / real(BENT))
             bent = wp.min(bent * bent, real(1.0))
-            numbers[c, 2] = (real(1.0) - bent) * (elastic * real(corner_share)) + bent * real(BENT_SHARE)
+            elastic *= real(1.0) - bent
+            numbers[c, 2] = elastic * real(corner_share) + bent * real(BENT_SHARE)
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
@@ -93,6 +94,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
                         bend = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
                         part += wp.outer(bend, frame[wp.static(shape.links[q][1])])
                 put_tensor(c, 1 + p, share * part, numbers)
+        numbers[c, 1] = elastic
 
     return strain
 
