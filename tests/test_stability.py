@@ -105,6 +105,7 @@ SHAPES = {
     "jittered": lambda *x: tuple(
         p + np.random.default_rng(k).uniform(-0.25, 0.25, p.shape) for k, p in enumerate(x)
     ),
+    "bent": lambda x, y, *z: (x, y + 0.3 * (-1.0) ** np.round(x + y), *z),
     "disc": lambda x, y, *z: (x * np.sqrt(1.0 - y**2 / 18.0), y * np.sqrt(1.0 - x**2 / 32.0), *z),
 }
 KINDS = [((4, 3), "lattice"), ((4, 3), "triangles"), ((2, 2, 2), "lattice"), ((2, 2, 2), "tetrahedra")]
@@ -118,10 +119,10 @@ def test_no_state_of_a_small_box_of_cells_grows(edges, size, cells, courant, poi
 
 
 @pytest.mark.parametrize("edges", ["free", "mixed"])
-@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "disc"])
+@pytest.mark.parametrize("shape", ["flat", "leaning", "jittered", "bent", "disc"])
 @pytest.mark.parametrize(("size", "cells"), KINDS)
 def test_no_state_of_cells_of_any_shape_grows(size, cells, shape, edges):
-    """10 : 1, leaning by 63°, nodes within a quarter of a spacing, a quarter of an ellipse mapped from a box."""
+    """10 : 1, leaning by 63°, nodes within a quarter of a spacing, trapezia, a quarter of an ellipse."""
     assert radius(size, cells, shape, edges=edges, poisson=0.49) <= 1.0 + 1e-12
 
 

@@ -7,7 +7,8 @@ viscosity, no smooth motion does.
 
 Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening
 of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow. What
-is rough is then met by a stress of a tenth of the cell's q at most: soil cannot carry more of it.
+is rough is then met by a stress of a tenth of the cell's q at most: soil cannot carry more of it. Bent cells lose
+both too, and get another κ for it.
 """
 
 from functools import cache
@@ -24,11 +25,11 @@ from ..state.clock import FOLDED
 from .cell_numbers import tensors_of
 from .cell_shape import cell_shape
 
-# κ goes over to BENT_SHARE as (b/BENT)² goes to 1, with b = 0 in a parallelogram and up to 1 where a corner folds;
-# without that it is FLOWING_SHARE where soil flows. With viscosity alone against it, flow bends a cell further and
-# further: the free surface beside a footing gets saw-toothed, and cells fold. Elastic cells that are not
-# parallelepipeds need more than what bends a lattice's exactly: layers of a bar of jittered hexahedra that spins
-# with half of c_s at its rim drifted to and fro until they folded.
+# As β = (b/BENT)² goes to 1, with b = 0 in a parallelogram and up to 1 where a corner folds, a cell goes over to
+# BENT_SHARE and no sharpening; without that κ is FLOWING_SHARE where soil flows. With viscosity alone against it,
+# flow bends a cell further and further: the free surface beside a footing gets saw-toothed, and cells fold. In
+# elastic bodies layers of a bar of jittered hexahedra, spinning with half of c_s at its rim, drifted to and fro
+# until they folded; sharpened cells with that κ grow.
 FLOWING_SHARE, BENT_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
 ROUGH = 0.1  # of q: the most that viscosity adds to the stress of a cell that flows
 
@@ -81,12 +82,12 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool):
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
         elastic = real(1.0) - flowed
-        numbers[c, 1] = elastic
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
             bent = wp.min(bend(x, frame) / (real(BENT) * real(BENT)), real(1.0))
             straight = elastic * kappa + flowed * real(FLOWING_SHARE)
             numbers[c, 2] = wp.lerp(straight, real(BENT_SHARE), bent)
+            elastic *= real(1.0) - bent
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
@@ -95,6 +96,7 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool):
                     if m >= 0:
                         part += wp.outer(v[m] - G * x[m], frame[a])
                 put_tensor(c, 1 + p, share * part, numbers)
+        numbers[c, 1] = elastic
 
     return strain
 
@@ -135,7 +137,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
         packed_table(corners)
         packed_numbers(numbers)
         packed_forces(forces)
-        x, dt = shape.Modes(), time_step[0]
+        x, dt, flowed = shape.Modes(), time_step[0], real(0.0)
         mean, mean_rate = types.stress(), types.stress()
         stress_parts, rate_parts = Parts(), Parts()
         for k in range(wp.static(n)):
@@ -145,6 +147,8 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
             sigma = space.phi.stress(point.phi)
             if wp.static(sharp):
                 sigma = nodes.sharpened[i]
+            if wp.static(law.flows):
+                flowed = wp.max(flowed, nodes.flowed[i])
             x += wp.outer(T[k], point.x)
             mean += sigma
             mean_rate += rate
@@ -165,9 +169,9 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
         G = per_share * tensor_at(c, 0, numbers)
         whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
         tau = eta * (whole - real(per_corner) * mean_rate)
-        elastic, most = numbers[c, 1], real(0.0)
-        if wp.static(law.flows) and elastic < real(1.0):
-            most = real(ROUGH) * real(per_corner) * space.stress.von_mises(mean) / (real(1.0) - elastic)
+        most = real(0.0)
+        if wp.static(law.flows) and flowed > real(0.0):
+            most = real(ROUGH) * real(per_corner) * space.stress.von_mises(mean) / flowed
             tau = bounded(tau, most, material)
         S = real(per_corner) * mean + tau
         F = shape.Modes()
@@ -181,7 +185,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
-                if wp.static(law.flows) and elastic < real(1.0):
+                if wp.static(law.flows) and flowed > real(0.0):
                     rough = bounded(rough, most, material)
                 W[p] = towards * stress_parts[p] + rough
                 power += share * space.stress.complementary(
