@@ -189,7 +189,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
             for t in range(touched.shape[1]):
                 gap, n = distance(nodes.point[i].x, middle(t, table, travel), t, table)
                 away = wp.dot(nodes.half[i].v - velocity(t, HALF, table, drive), n)
-                if gap + dt * wp.min(away, real(0.0)) <= table.slack:
+                if gap + dt * wp.min(away, real(0.0)) <= table.slack[t]:
                     near = wp.int32(1)
             if near == 0:
                 return
@@ -217,10 +217,10 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                     V, least = velocity(t, wp.static(when), table, drive), real(0.0)
                     pulls = table.glued[t] == 1 and touched[row, t] == 1
                     if wp.static(not ends):
-                        if gap > table.slack or pulls:
+                        if gap > table.slack[t] or pulls:
                             least = -gap / dt
                         else:
-                            least = wp.max(real(-RETURN) * (gap + table.slack) / dt, real(0.0))
+                            least = wp.max(real(-RETURN) * (gap + table.slack[t]) / dt, real(0.0))
                     stopped = wp.where(table.glued[t] == 1, real(ENDLESS), real(0.0))
                     if wp.static(strong and sweep == 0):
                         area = wp.max(-wp.dot(shares[i], n), real(0.0))
@@ -228,7 +228,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                     pressed, lag = contacts.pressed[row, t] + real(0.0), table.lag[t] + real(0.0)
                     if pressed < real(0.0):  # it has not touched it yet
                         pressed = real(0.0)
-                        if gap <= table.slack:
+                        if gap <= table.slack[t]:
                             lag = real(0.0)
                     if wp.static(sweep > 0):
                         lag = real(0.0)
