@@ -67,7 +67,8 @@ def _rate_kernel(space: Space, kind: CellKind):
         c = first + wp.tid()
         x = shape.Modes()
         for k in range(wp.static(kind.corners)):
-            x += wp.outer(T[k], nodes.point[corners[c, k]].x)
+            i = corners[c, k]
+            x += wp.outer(T[k], nodes.point[i].x)
         B, volume, frame = shape.measure(x)
         spread = shape.spread(B)
         largest = space.algebra.largest(spread)

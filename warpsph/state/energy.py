@@ -8,7 +8,7 @@ UNITS = {1: "J/m²", 2: "J/m", 3: "J"}  # of a bar for its section, of plane str
 
 TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping")  # where it is, or went
 LOSSES = TAKEN[2:]
-GIVEN = ("gravity", "loads", "walls")  # where it came from
+GIVEN = ("gravity", "loads", "walls", "tools")  # where it came from
 COLUMNS = (*TAKEN, *GIVEN, "unaccounted")
 
 
@@ -25,6 +25,7 @@ class Energy:
         gravity: work of the body force on the body.
         loads: work of tractions on the body.
         walls: work of the conditions on velocities on the body.
+        tools: work of the tools on the body: their friction takes it, where nodes land as well.
         initial: kinetic and elastic at the start.
     """
 
@@ -36,6 +37,7 @@ class Energy:
     gravity: float
     loads: float
     walls: float
+    tools: float
     initial: float
 
     @property

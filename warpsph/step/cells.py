@@ -20,6 +20,7 @@ from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
 from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
 from ..operators.sharpening import Sharpening
+from ..operators.tools import Tools
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
@@ -42,12 +43,15 @@ class CellStepper(Stepper):
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
+        tools: the tools, what they do to the body, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
         driven = scene.boundary.functions
-        clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
+        clock = Clock(
+            scene.body_force, (*driven, *scene.loads.functions, *scene.tool_functions[0]), space, launcher
+        )
         c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
         device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
@@ -60,8 +64,10 @@ class CellStepper(Stepper):
         self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self.loads = LoadedFaces(body, clock, len(driven))
+        offset = len(driven) + len(scene.loads.functions)
+        self.tools = Tools(body, clock, offset, self.conditions)
         self._limit = CellLimit(body, clock)
-        self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
+        self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work, tools=self.tools.work)
         kind, slots, self._kappa = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
@@ -72,7 +78,7 @@ class CellStepper(Stepper):
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
         super().__init__(launcher, clock, parts=(self._limit,))
-        for part in (clock, sharpening, self.loads, self._limit, self._energy):
+        for part in (clock, sharpening, self.loads, self.tools, self._limit, self._energy):
             kernels += part.kernels
         load_kernels(kernels, device)
         self._limit.refresh()
@@ -116,6 +122,7 @@ class CellStepper(Stepper):
         self.loads.add(self._forces)
         inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
+        self.tools.settle()
         clock.tick()
 
     def _rates(self) -> None:
@@ -124,6 +131,7 @@ class CellStepper(Stepper):
         nodes, points, corners = body.nodes, body.nodes.point, body.corners
         inputs = [self.conditions, body.scene.damping, clock.time_step, nodes]
         launch(self._kick, points, inputs, gathers=False)
+        self.tools.stop()
         launch(self._strain, corners, [self._kappa, corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
