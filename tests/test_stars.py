@@ -61,12 +61,21 @@ def turned(angle):
     return linear(np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle))
 
 
-def closing(angle):
-    """A motion that bends a lattice without its upper right quarter round (10, 10), to that angle."""
+def quarter(x, y):
+    return (x > 10.0) & (y > 10.0)
+
+
+def closing(angle, first=1.0, last=1.0):
+    """A motion that bends a lattice without its upper right quarter round (10, 10), to that angle.
+
+    Both sides of the notch are so many times as long as before.
+    """
 
     def motion(x):
         radius, phi = np.hypot(*(x - 10.0).T), np.arctan2(*(x - 10.0).T[::-1])
-        phi = np.radians(angle) / (1.5 * np.pi) * np.mod(phi - 0.5 * np.pi, 2.0 * np.pi)
+        share = np.mod(phi - 0.5 * np.pi, 2.0 * np.pi) / (1.5 * np.pi)
+        radius = radius * (first + (last - first) * share)
+        phi = np.radians(angle) * share
         return 10.0 + radius[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=1)
 
     return motion
@@ -157,7 +166,9 @@ BODIES = {
     "jittered by 1e-6": jittered(lattice(30, 30), 1e-6, edges=True),
     "jittered by 0.05": jittered(lattice(30, 30), 0.05, edges=True),
     "jittered by 0.25": jittered(lattice(30, 30), 0.25, edges=True),
-    "a notch of 20 degrees": moved(lattice(20, 20, lambda x, y: (x > 10.0) & (y > 10.0)), closing(340.0)),
+    "a notch of 20 degrees": moved(lattice(20, 20, quarter), closing(340.0)),
+    "a notch with a long side": moved(lattice(20, 20, quarter), closing(340.0, 1.0, 2.4)),
+    "a notch with the other side long": moved(lattice(20, 20, quarter), closing(340.0, 2.4, 1.0)),
     "two holes": jittered(lattice(30, 18, **HOLES), 0.2),
     "two holes, a lattice": lattice(30, 18, **HOLES),
     "a slit pressed shut": moved(

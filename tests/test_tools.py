@@ -18,10 +18,13 @@ from warpsph import (
     Elastic,
     Fixed,
     Glued,
+    History,
     Linear,
+    Output,
     PerzynaVonMises,
     Plane,
     PrescribedVelocity,
+    Probe,
     Roller,
     Rough,
     Scene,
@@ -29,6 +32,9 @@ from warpsph import (
     Simulation,
     Smooth,
     Sphere,
+    ToolForce,
+    ToolImpulse,
+    ToolTorque,
     edge,
 )
 from warpsph.device.compiling import forward_kernel
@@ -37,6 +43,8 @@ from warpsph.device.precision import precision as precision_of
 from warpsph.mesh.continuum import CONTINUA
 from warpsph.operators.tool_forms import distance_function, exact_vector, middle_function, tool_table, tool_types
 from warpsph.physics.space import Space
+from warpsph.scene.document import decode, encode
+from warpsph.scene.fingerprint import fingerprint
 
 G = 9.81
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
@@ -440,6 +448,61 @@ def test_a_belt_carries_a_block_until_both_are_of_one_speed():
     assert simulation.energy().tools == pytest.approx(0.5 * mass.sum() * 0.3**2, rel=5e-2)
 
 
+# What a run keeps
+
+
+def documented():
+    tools = (
+        Plane((0.0, 0.0), (0.0, 1.0), interface=Coulomb(0.3, lag=0.01), name="ground"),
+        Cylinder((0.25, 0.85), 0.25, interface=Rough(), velocity=(0.0, Linear(-20.0))),
+        Block((2.0, 0.5), (0.4, 0.4), angle=0.3, rounding=0.1, interface=Adhesive(5.0, 0.1)),
+        Plane((-1.0, 0.0), (1.0, 0.0), interface=Glued(), velocity=(lambda t: 0.1 * t, 0.0), name="wall"),
+    )
+    probes = (
+        Probe("load", "N/m", ToolForce("cylinder", axis=1)),
+        Probe("torque", "N", ToolTorque("cylinder")),
+        Probe("given", "N s/m", ToolImpulse("ground", axis=1)),
+    )
+    return falls(tools=tools, output=Output(probes=probes, interval=0.01))
+
+
+def test_a_document_says_all_of_it():
+    scene = documented()
+    document, arrays = encode(scene)
+    assert document["tools"][1]["velocity"] == [0.0, {"type": "Linear", "rate": -20.0}]
+    assert document["tools"][3]["velocity"][0] == {"code": "tools.3.velocity.0"}
+    again = decode(document, arrays, lambda place: scene)
+    assert again.tools == scene.tools and fingerprint(again) == fingerprint(scene)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"interface": Coulomb(0.31, lag=0.01)},
+        {"interface": Coulomb(0.3)},
+        {"interface": Smooth()},
+        {"velocity": (0.0, 0.0)},
+        {"normal": (0.1, 1.0)},
+        {"point": (0.0, -0.1)},
+    ],
+)
+def test_a_checkpoint_fits_no_other_tools(other):
+    scene = documented()
+    changed = replace(scene, tools=(replace(scene.tools[0], **other), *scene.tools[1:]))
+    assert fingerprint(changed) != fingerprint(scene)
+
+
+def test_probes_of_tools_are_columns_of_the_history():
+    simulation = Simulation(documented(), device="cpu", threads=1)
+    history = History(simulation)
+    simulation.run(observers=[history])
+    tools = simulation.stepper.tools
+    assert history["load"][-1] == tools.force(1)[1] != 0.0
+    assert history["torque"][-1] == tools.torque(1)[2] != 0.0
+    assert history["given"][-1] == tools.impulse(0)[1] < 0.0
+    assert history["energy.tools"][-1] == simulation.energy().tools
+
+
 # Bits
 
 FIELDS = ("displacement", "velocity", "stress")
@@ -521,6 +584,18 @@ WRONG = {
     "twins": (lambda: falls(tools=(GROUND, GROUND)), "tools[1].name = 'ground'"),
     "interface": (lambda: Plane((0.0, 0.0), (0.0, 1.0), interface=0.5), "Plane.interface = 0.5"),
     "rounding": (lambda: Block((0.0, 0.0), (1.0, 0.2), rounding=0.2), "Block.rounding = 0.2"),
+    "probe": (
+        lambda: falls(output=Output(probes=(Probe("f", "N", ToolForce("grond", 0)),))),
+        "ToolForce.tool = 'grond' is not allowed: it must be one of ground (did you mean ground?)",
+    ),
+    "probe's axis": (
+        lambda: falls(output=Output(probes=(Probe("f", "N", ToolForce("ground", 2)),))),
+        "ToolForce.axis = 2",
+    ),
+    "torque's axis": (
+        lambda: falls(output=Output(probes=(Probe("f", "N", ToolTorque("ground", 0)),))),
+        "ToolTorque.axis = 0",
+    ),
     "small": (lambda: falls(large_displacements=False), "take large_displacements=True"),
 }
 

@@ -189,7 +189,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
             for t in range(touched.shape[1]):
                 gap, n = distance(nodes.point[i].x, middle(t, table, travel), t, table)
                 away = wp.dot(nodes.half[i].v - velocity(t, HALF, table, drive), n)
-                if gap + dt * wp.min(away, real(0.0)) <= table.slack:
+                if gap + dt * wp.min(away, real(0.0)) <= table.slack[t]:
                     near = wp.int32(1)
             if near == 0:
                 return
@@ -217,24 +217,24 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                     V, least = velocity(t, wp.static(when), table, drive), real(0.0)
                     pulls = table.glued[t] == 1 and touched[row, t] == 1
                     if wp.static(not ends):
-                        if gap > table.slack or pulls:
+                        if gap > table.slack[t] or pulls:
                             least = -gap / dt
                         else:
-                            least = wp.max(real(-RETURN) * (gap + table.slack) / dt, real(0.0))
+                            least = wp.max(real(-RETURN) * (gap + table.slack[t]) / dt, real(0.0))
                     stopped = wp.where(table.glued[t] == 1, real(ENDLESS), real(0.0))
-                    if wp.static(strong and sweep == 0):
+                    if wp.static(strong) and sweep == 0:
                         area = wp.max(-wp.dot(shares[i], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
                     pressed, lag = contacts.pressed[row, t] + real(0.0), table.lag[t] + real(0.0)
                     if pressed < real(0.0):  # it has not touched it yet
                         pressed = real(0.0)
-                        if gap <= table.slack:
+                        if gap <= table.slack[t]:
                             lag = real(0.0)
-                    if wp.static(sweep > 0):
+                    if sweep > 0:
                         lag = real(0.0)
                     friction = table.friction[t]
                     w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, h, lag, stopped)
-                    if wp.static(sweep == 0):
+                    if sweep == 0:
                         if pressed > real(0.0) or meets == 1:
                             contacts.pressed[row, t] = force
                         if wp.static(not ends) and force > real(0.0):
@@ -249,7 +249,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         if wp.static(not ends):
                             meeting[row] = 1
                     if wp.static(not ends):
-                        touched[row, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[row, t])
+                        touched[row, t] = wp.where(sweep == 0, meets, wp.max(meets, touched[row, t]))
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
             contacts.settled[row] = pushed

@@ -101,7 +101,8 @@ def load_kernel(space: Space, kind: CellKind):
         row = first + wp.tid()
         c, done = table.cell[row], real(0.0)
         for k in range(wp.static(corners)):
-            done += wp.dot(own[row, k], nodes.half[corner_nodes[c, k]].v)
+            i = corner_nodes[c, k]
+            done += wp.dot(own[row, k], nodes.half[i].v)
             own[row, k] = types.vector()
         for at in range(table.first[row], table.first[row + 1]):
             factor = drive[END, table.function[at]]
@@ -122,7 +123,8 @@ def load_kernel(space: Space, kind: CellKind):
                     p = table.corner[at, k]
                     own[row, p] = own[row, p] + (factor * weights[q] * shares[q, k]) * pushed
         for k in range(wp.static(corners)):
-            done += wp.dot(own[row, k], nodes.half[corner_nodes[c, k]].v)
+            i = corner_nodes[c, k]
+            done += wp.dot(own[row, k], nodes.half[i].v)
             forces[c, k] = forces[c, k] + own[row, k]
         work[row] = work[row] + wp.float64(real(0.5) * time_step[0] * done)
 

@@ -92,7 +92,8 @@ def part_kernel(space: Space, kind: CellKind):
         for q in range(wp.static(points)):
             along = Along()
             for k in range(wp.static(size)):
-                along += wp.outer(slope_at[wp.static(size) * q + k], nodes.point[faces[f, k]].x)
+                i = faces[f, k]
+                along += wp.outer(slope_at[wp.static(size) * q + k], nodes.point[i].x)
             area = (sign[f] * weights[q]) * area_vector(along)
             for k in range(wp.static(size)):
                 parts[f, k] = parts[f, k] + values[q, k] * area

@@ -68,7 +68,8 @@ def _stiffness_kernel(space: Space, kind: CellKind):
         c = first + wp.tid()
         x = shape.Modes()
         for k in range(wp.static(kind.corners)):
-            x += wp.outer(T[k], nodes.point[corners[c, k]].x)
+            i = corners[c, k]
+            x += wp.outer(T[k], nodes.point[i].x)
         B, volume, _ = shape.measure(x)
         result[c] = space.algebra.largest(shape.spread(B)) / wp.abs(volume)
 

@@ -41,8 +41,9 @@ def _share_kernel(space: Space):
     def share(first: int, outline: OutlineArrays, nodes: CellNodes, vectors: wp.array(dtype=vector)):
         i = first + wp.tid()
         result = vector()
-        if outline.after[i] != INSIDE:
-            along = real(0.5) * (nodes.point[outline.after[i]].x - nodes.point[outline.before[i]].x)
+        after, before = outline.after[i], outline.before[i]
+        if after != INSIDE:
+            along = real(0.5) * (nodes.point[after].x - nodes.point[before].x)
             result = vector(along[1], -along[0])
         vectors[i] = result
 

@@ -188,7 +188,8 @@ def _area(space: Space, kind: CellKind):
     def area(c: int, corners: wp.array2d(dtype=wp.int32), nodes: CellNodes):
         x = shape.Modes()
         for k in range(wp.static(kind.corners)):
-            x += wp.outer(T[k], nodes.point[corners[c, k]].x)
+            i = corners[c, k]
+            x += wp.outer(T[k], nodes.point[i].x)
         _, volume, _ = shape.measure(x)
         return volume
 
@@ -211,8 +212,9 @@ def _wear_kernel(space: Space, kind: CellKind):
         c = first + wp.tid()
         edges = real(0.0)
         for k in range(wp.static(kind.corners)):
-            end = nodes.point[corners[c, (k + 1) % wp.static(kind.corners)]].x
-            edges += wp.length_sq(nodes.point[corners[c, k]].x - end)
+            i = corners[c, k]
+            j = corners[c, (k + 1) % wp.static(kind.corners)]
+            edges += wp.length_sq(nodes.point[i].x - nodes.point[j].x)
         now = area(c, corners, nodes) / edges
         if shape[c] == real(0.0):
             shape[c] = now

@@ -11,7 +11,7 @@ from ..scene.scene import Scene
 from ..scene.tool import Form
 from ..state.clock import HALF
 
-SLACK = 1e-6  # spacings: so near to a surface, on either side, a node is on it
+SLACK = 1e-6  # spacings
 OWN = -1.0  # strength that stands for that of the soil
 
 
@@ -39,7 +39,7 @@ def tool_types(space: Space) -> type:
         strength: wp.array(dtype=space.real)
         lag: wp.array(dtype=space.real)
         glued: wp.array(dtype=wp.int32)
-        slack: space.real
+        slack: wp.array(dtype=space.real)
 
     return ToolTable
 
@@ -62,13 +62,11 @@ def tool_table(scene: Scene, space: Space, device: wp.Device, offset: int):
         ("friction", [own.friction for own in carried], space.real, count),
         ("strength", strengths, space.real, count),
         ("lag", [own.lag for own in carried], space.real, count),
+        ("slack", [_slack(scene, space, *part) for part in zip(forms, centres, strict=True)], space.real, count),
         ("glued", [own.glued for own in carried], wp.int32, count),
     ):
         numbers = np.array(values, dtype=np.int32 if dtype is wp.int32 else float)
         setattr(table, name, wp.array(numbers, dtype=dtype, shape=shape, device=device))
-    # Positions of nodes and tools are counted from the body's middle, and rounded there.
-    sizes = [np.abs(mesh.nodes - mesh.middle).max(), *np.abs(centres).ravel(), *(form.rounding for form in forms)]
-    table.slack = max(SLACK * mesh.spacing, 16.0 * float(np.finfo(space.precision.dtype).eps) * max(sizes))
     return table
 
 
@@ -76,6 +74,13 @@ def _from(middle: np.ndarray, form: Form) -> np.ndarray:
     """Where a form is, seen from the body's middle; a plane where it is nearest to that, which keeps digits."""
     centre = form.centre - middle
     return form.axes[0] * (form.axes[0] @ centre) if form.plane else centre
+
+
+def _slack(scene: Scene, space: Space, form: Form, centre: np.ndarray) -> float:
+    """So near to a surface a node is on it [m]; positions of both are rounded as seen from the body's middle."""
+    mesh, rounding = scene.mesh, 16.0 * float(np.finfo(space.precision.dtype).eps)
+    sizes = [np.abs(mesh.nodes - mesh.middle).max(), np.abs(centre).max(), form.rounding]
+    return max(SLACK * mesh.spacing, rounding * max(sizes))
 
 
 @cache

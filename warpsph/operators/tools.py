@@ -119,11 +119,11 @@ class Tools:
 
     def impulse(self, tool: int) -> np.ndarray:
         """What the body has given a tool since the start [N s], shape (d,)."""
-        return -self._contacts.total.numpy()[:, tool].sum(axis=0)
+        return 0.0 - self._contacts.total.numpy()[:, tool].sum(axis=0)
 
     def _mean(self, given: wp.array, tool: int) -> np.ndarray:
         dt = float(self._clock.time_step.numpy()[0])
-        total = -given.numpy()[:, tool].astype(float).sum(axis=0)
+        total = 0.0 - given.numpy()[:, tool].astype(float).sum(axis=0)
         return total / dt if dt > 0.0 else total
 
 

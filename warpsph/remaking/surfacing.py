@@ -162,7 +162,8 @@ def _wish_kernel(precision: Precision):
         if degree == 2:
             if stars.degree[before] < 3:
                 return
-            beyond = positions[stars.row[before, 2]]
+            third = stars.row[before, 2]
+            beyond = positions[third]
             place = (ahead + behind + beyond) / real(3.0)
             least = area(behind, ahead, beyond) / real(3.0)
         else:

@@ -111,7 +111,7 @@ def _fill(
 ):
     """The cells that a node owns, and the places of all that are around it."""
     i = first + wp.tid()
-    degree, rank = stars.degree[i], wp.int32(0)
+    start, degree, rank = node_cells.first[i], stars.degree[i], wp.int32(0)
     for k in range(_cells_of(i, site, stars)):
         a, b = stars.row[i, k], neighbour(i, k + 1, degree, stars)
         place = wp.int32(0)
@@ -132,4 +132,4 @@ def _fill(
             place = 3 * (first_cell[b] + its) + 1
             if its < 0:
                 lost[0] = 1
-        node_cells.place[node_cells.first[i] + k] = place
+        node_cells.place[start + k] = place

@@ -138,7 +138,7 @@ class Scene:
         if self.free_surface is not None:
             self._check_free_surface()
         self.numerics.scheme.check_cells(self.mesh)
-        self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
+        self.numerics.check_support(self.mesh)
         self._check_loads()
         self._check_tools()
         if self.cells is not None:

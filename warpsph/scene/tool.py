@@ -7,6 +7,7 @@ radius, `Form`: a plane is the upper side of one without end, a sphere has edges
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..errors import SceneError
 from ..validate import TimeFunction, instance, number, time_function, vector
 from .interface import Interface, Smooth
 
+NAME = re.compile(r"[^\W\d]\w{0,99}")
 ENDLESS = 1e30  # half an edge that never ends [m]
 TOUCHING = 1e-6  # spacings: to be so deep in a tool at the start is to touch it
 
@@ -68,7 +70,9 @@ class Tool:
     def __post_init__(self):
         own = type(self).__name__
         object.__setattr__(self, "name", own.lower() if self.name is None else self.name)
-        instance(f"{own}.name", self.name, str, "a text")
+        if not isinstance(self.name, str) or not NAME.fullmatch(self.name):
+            allowed = "it must be of letters, digits and _, and begin with a letter"
+            raise SceneError(f"{own}.name", self.name, allowed)
         allowed = "an interface such as Smooth() or Coulomb(0.5)"
         instance(f"{own}.interface", self.interface, Interface, allowed)
         if self.velocity is None:

@@ -89,7 +89,7 @@ class CellBody(Body):
         point = np.zeros(n, dtype=types.Point.numpy_dtype())
         point["x"] = x
         point["phi"] = np.concatenate([scene.initial_velocity, scene.initial_stress], axis=1)
-        volume, _ = mesh.node_volumes()
+        volume = mesh.node_volumes()
         nodes.point = wp.array(point, dtype=types.Point, device=device)
         nodes.reference = wp.array(x, dtype=types.vector, device=device)
         nodes.mass = wp.array(scene.material.density * volume, dtype=space.real, device=device)
@@ -138,7 +138,7 @@ class CellBody(Body):
         mesh = self.mesh()
         if self.scene.large_displacements:
             mesh = mesh.with_nodes(mesh.nodes + self.nodes.displacement.numpy())
-        return self.nodes.mass.numpy() / mesh.node_volumes()[0]
+        return self.nodes.mass.numpy() / mesh.node_volumes()
 
     def stress(self) -> np.ndarray:
         """The stress that forces come from [Pa], sharpened if any is, stored components, shape (n, s)."""
