@@ -10,8 +10,8 @@ import warpsph
 
 PACKAGE = Path(warpsph.__file__).parent
 ROOMS = (
-    *("errors", "validate", "mesh", "analysis", "scene", "device", "physics", "materials", "state", "operators"),
-    *("step", "storage", "simulation", "export", "cli", "report"),
+    *("errors", "validate", "mesh", "analysis", "scene", "device", "physics", "materials", "state", "remaking"),
+    *("operators", "step", "storage", "simulation", "export", "cli", "report"),
 )
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
 

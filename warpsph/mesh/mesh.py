@@ -128,6 +128,18 @@ class Mesh:
         """How the corners of a hexahedron follow its first modes, ∂²x/∂ξ_a∂ξ_b in the middle [m], (3, m, 3)."""
         return self._corner_sums(0.5 * self.kind.signs[:, :3])
 
+    def bent_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cells of a grid that are no parallelepipeds, how far they are bent, b² = Σ (∇ξ_a · x_m)² over the
+        hourglass modes m and their axes a with ξ = ±1 at the corners, and their gradients (k, c, d) [1/m]."""
+        twists = self._corner_sums(self.kind.signs / self.kind.corners)
+        bent = np.flatnonzero((np.abs(twists) > 1e-6 * self.spacing).any(axis=(0, 2)))
+        inverse = np.linalg.inv(self.cell_jacobians()[bent])
+        links = [(m, a) for m, axes in enumerate(self.kind.modes) for a in axes]
+        bends = sum(
+            ((2.0 * inverse[:, a] * twists[m, bent]).sum(axis=1) ** 2 for m, a in links), np.zeros(len(bent))
+        )
+        return bent, bends, np.array(self.kind.gradients) @ inverse
+
     def cell_jacobians(self, slopes: np.ndarray | None = None) -> np.ndarray:
         """∂x/∂ξ at one place of each cell [m], the axes as columns, shape (m, d, d).
 
@@ -141,6 +153,14 @@ class Mesh:
         """Σ_k w_k x_k over the corners of each cell, a sum for each column of weights (c, w), shape (w, m, d)."""
         corners = [self.nodes[corner] for corner in self.cells.T]
         return np.array([sum(w * x for w, x in zip(column, corners, strict=True)) for column in weights.T])
+
+    def corner_volumes(self) -> np.ndarray:
+        """det ∂x/∂ξ at the corners of each cell [mᵈ], shape (m, c), of a simplex one for all, (m, 1).
+
+        Where one is not above 0 the cell is flat or folded, although it may have a volume as a whole.
+        """
+        places = self.kind.points if self.kind.grid else self.kind.points[:1]
+        return np.stack([np.linalg.det(self.cell_jacobians(self.kind.slopes(place))) for place in places], axis=1)
 
     @cached_property
     def _inverse_jacobians(self) -> np.ndarray:

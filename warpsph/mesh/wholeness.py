@@ -18,7 +18,6 @@ from .faces import match_faces, row_keys
 from .kinds import CellKind
 from .mesh import Mesh
 from .overlap import TOUCHING, hanging, overlap
-from .small_matrices import determinants
 
 FLAT = 1e-9  # a cell is flat whose Jacobian at a corner, over its longest edge to the d, is less
 ASLANT = (1.0, 2.0**0.5, 3.0**0.5)  # a direction in which the nodes of a lattice have places of their own
@@ -66,9 +65,7 @@ def positive(nodes: np.ndarray, cells: np.ndarray, kind: CellKind) -> np.ndarray
     longest = np.max(
         [np.linalg.norm(nodes[cells[:, b]] - nodes[cells[:, a]], axis=1) for a, b in kind.edges], axis=0
     )
-    places = kind.points if kind.grid else kind.points[:1]
-    size = np.stack([determinants(mesh.cell_jacobians(kind.slopes(place))) for place in places], axis=1)
-    size = size / longest[:, None] ** kind.dim
+    size = mesh.corner_volumes() / longest[:, None] ** kind.dim
     backward = (size < -FLAT).all(axis=1)
     wrong = ~(backward | (size > FLAT).all(axis=1))
     around = "" if not kind.grid or kind.dim == 1 else "; corners go round it, in the order of VTK"
