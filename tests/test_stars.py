@@ -167,8 +167,8 @@ BODIES = {
     "jittered by 0.05": jittered(lattice(30, 30), 0.05, edges=True),
     "jittered by 0.25": jittered(lattice(30, 30), 0.25, edges=True),
     "a notch of 20 degrees": moved(lattice(20, 20, quarter), closing(340.0)),
-    "a notch with a long side": moved(lattice(20, 20, quarter), closing(340.0, 1.0, 2.4)),
-    "a notch with the other side long": moved(lattice(20, 20, quarter), closing(340.0, 2.4, 1.0)),
+    "a notch with a long side": moved(lattice(20, 20, quarter), closing(340.0, 0.6, 1.4)),
+    "a notch with the other side long": moved(lattice(20, 20, quarter), closing(340.0, 1.4, 0.6)),
     "two holes": jittered(lattice(30, 18, **HOLES), 0.2),
     "two holes, a lattice": lattice(30, 18, **HOLES),
     "a slit pressed shut": moved(
