@@ -127,9 +127,7 @@ def wrap_kernel(most_seen: int, most_edges: int):
                     for way in range(
                         2
                     ):  # the edge that starts there; and the one that ends there, from out of reach
-                        other = there.after
-                        if wp.static(way == 1):
-                            other = before[k]
+                        other = wp.where(way == 1, before[k], there.after)
                         end = seen_from(here, other, site[other])
                         if other != i and (way == 0 or square(end.x, end.y) > within):
                             if edges == most_edges:
