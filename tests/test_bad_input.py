@@ -62,6 +62,12 @@ def scene(**changed):
     return Scene(**{"shape": PLATE, "material": Elastic(**ELASTIC), "duration": 1.0, **changed})
 
 
+def dented(x, y):
+    """The node in the middle of four cells is pushed into the first, which keeps a volume but no shape."""
+    inner = (x == 0.2) & (y == 0.2)
+    return np.where(inner, 0.06, x), np.where(inner, 0.06, y)
+
+
 def refused(build, field, value, allowed):
     """Assert that a build raises one line "field = value is not allowed: … allowed …"."""
     with pytest.raises(SceneError) as caught:
@@ -173,6 +179,7 @@ SHAPES = [
     (lambda: PLATE.mapped(3), "mapped.function", 3, "a function of position"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: ((x - 0.6) ** 2, y))), "mapped.function", None, "no folds"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: (-x, y))), "mapped.function", None, "volume positive"),
+    (lambda: scene(shape=Box((0.4, 0.4), 0.2).mapped(dented)), "mapped.function", None, "at each corner"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: x)), "mapped.function", None, "must return 2 finite"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: (NAN * x, y))), "mapped.function", None, "2 finite"),
 ]

@@ -1,8 +1,8 @@
 """The files of the frame store: written whole, checked as they are read, removed only where they are known.
 
 frames/about.json     the scene's name, the times asked for, the walls, what is drawn
-frames/body.npz       the initial lattice
-frames/000012.npz     time, step and the fields (float32) at the first step at or after the 12th time
+frames/body.npz       the initial lattice, the walls, the tools at the start
+frames/000012.npz     time, step and the fields (float32) at the first step at or after the 12th time, tools
 """
 
 from __future__ import annotations
@@ -78,11 +78,12 @@ RULES = {
     "curve": lambda value: _pair(value, _text),
     "curve_reference": lambda value: _pair(value, _number),
     "walls": lambda value: isinstance(value, list) and all(map(_wall, value)),
+    "tools": lambda value: isinstance(value, list) and all(map(_name, value)),
 }
 
 
-def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
-    """The initial lattice, and the faces of so many walls.
+def read_body(run: Path, walls: int, tools: int) -> tuple[Mesh, list[np.ndarray], list[tuple]]:
+    """The initial lattice, the faces of so many walls, and the points and polygons of so many tools.
 
     Raises:
         SceneError: it can not be read.
@@ -107,7 +108,14 @@ def read_body(run: Path, walls: int) -> tuple[Mesh, list[np.ndarray]]:
         require(len(cells) > 0, "it has no cells")
         held = [check_indices(f"wall_{k}", arrays[f"wall_{k}"], len(faces)) for k in range(walls)]
         require(all(wall.ndim == 1 and wall.size for wall in held), "a wall has no faces")
-    return Mesh(**parts | {"spacing": spacing}), held
+        mesh = Mesh(**parts | {"spacing": spacing})
+        require(bool((mesh.middle_volumes() > 0.0).all()), "a cell has no volume")
+        shapes = [(arrays[f"tool_{k}_points"], arrays[f"tool_{k}_polygons"]) for k in range(tools)]
+        for k, (points, polygons) in enumerate(shapes):
+            check_array(f"tool_{k}_points", points, shape=(None, 3))
+            check_array(f"tool_{k}_polygons", polygons, kind="iu", shape=(None, 4))
+            check_indices(f"tool_{k}_polygons", polygons, len(points))
+    return mesh, held, shapes
 
 
 def frame_paths(run: Path) -> list[Path]:
@@ -121,24 +129,28 @@ def frame_path(run: Path, number: int) -> Path:
     return run / FOLDER / f"{number:06d}.npz"
 
 
-def read_frame(path: Path, fields: Mapping, mesh: Mesh | None = None) -> dict[str, np.ndarray]:
-    """A frame's time, step and fields.
+def read_frame(path: Path, about: Mapping, mesh: Mesh) -> dict[str, np.ndarray]:
+    """A frame's time, step and fields, and how far its tools have come, `tools`, where it has any.
 
     Args:
         path: its file.
-        fields: names of the fields it has.
-        mesh: what they belong to, to check their shapes.
+        about: what about.json says.
+        mesh: what the fields belong to, to check their shapes.
 
     Raises:
         SceneError: it can not be read.
     """
     arrays = read_arrays("frame", path, "it can not be read ({error}); to do without it, remove it")
     with reading("frame", path, "it can not be read ({error}); to do without it, remove it"):
-        require(arrays.keys() == {"time", "step", *fields}, "it has other fields than about.json says")
+        tools = {"tools"} if about["tools"] else set()
+        names = {"time", "step", *about["fields"]} | tools
+        require(arrays.keys() == names, "it has other fields than about.json says")
         require(check_array("time", arrays["time"], shape=()) >= 0.0, "its time is below 0")
         require(check_array("step", arrays["step"], kind="iu", shape=()) >= 0, "its step is below 0")
-        for name in fields if mesh is not None else ():
+        for name in about["fields"]:
             check_array(name, arrays[name], shape=_shape(name, mesh))
+        for name in tools:
+            check_array(name, arrays[name], shape=(len(about["tools"]), mesh.dim))
     return arrays
 
 
@@ -184,8 +196,8 @@ def times_of_frames(run: Path, about: Mapping) -> dict[Path, float]:
     Raises:
         SceneError: one can not be read.
     """
-    mesh, _ = read_body(run, len(about["walls"]))
-    return {path: float(read_frame(path, about["fields"], mesh)["time"]) for path in frame_paths(run)}
+    mesh, *_ = read_body(run, len(about["walls"]), len(about["tools"]))
+    return {path: float(read_frame(path, about, mesh)["time"]) for path in frame_paths(run)}
 
 
 def save_arrays(path: Path, arrays: Mapping[str, object]) -> None:

@@ -33,6 +33,7 @@ from .frame_files import (
     read_frame,
     save_arrays,
 )
+from .tool_meshes import ToolMesh, tool_meshes
 from .walls import Wall, walls_of
 
 STORED = ("displacement", "velocity", "stress", "density", "free_surface")  # and the internal variables
@@ -98,7 +99,11 @@ class FrameWriter:
     def _describe(self, simulation: Simulation, rate: float) -> None:
         mesh, output, walls = simulation.mesh, simulation.scene.output, walls_of(simulation.scene)
         parts = {name: getattr(mesh, name) for name in ARRAYS}
-        save_arrays(self._run / FOLDER / BODY, parts | {f"wall_{k}": wall.faces for k, wall in enumerate(walls)})
+        parts |= {f"wall_{k}": wall.faces for k, wall in enumerate(walls)}
+        tools = tool_meshes(simulation.scene)
+        for k, tool in enumerate(tools):
+            parts |= {f"tool_{k}_points": tool.points, f"tool_{k}_polygons": tool.polygons}
+        save_arrays(self._run / FOLDER / BODY, parts)
         about = {
             "scene": simulation.scene.name,
             "times": self._times.tolist(),
@@ -109,6 +114,7 @@ class FrameWriter:
             "curve": output.curve,
             "curve_reference": output.curve_reference,
             "walls": [{"name": wall.name, "still": wall.still} for wall in walls],
+            "tools": [tool.name for tool in tools],
         }
         write_json(self._run / FOLDER / ABOUT, about)
 
@@ -121,6 +127,8 @@ class FrameWriter:
         path = frame_path(self._run, passed - 1)
         if passed and not path.exists():
             fields = {name: simulation.field(name).astype(np.float32) for name in self._fields}
+            if simulation.scene.tools:
+                fields["tools"] = simulation.stepper.tools.travel.numpy()
             save_arrays(path, {"time": simulation.time, "step": simulation.steps} | fields)
             for follower in self._followers:
                 follower.update()
@@ -141,6 +149,7 @@ class Frame:
         step: number of the step.
         mesh: the initial mesh, without its tags.
         stored: the stored fields, name → values.
+        tools: the tools where they are.
     """
 
     number: int
@@ -148,6 +157,7 @@ class Frame:
     step: int
     mesh: Mesh
     stored: Mapping[str, np.ndarray]
+    tools: tuple[ToolMesh, ...] = ()
 
     def field(self, name: str) -> np.ndarray:
         """A node field, as `Simulation.field` gives it (to float32).
@@ -175,6 +185,7 @@ class Frames(Sequence):
         rate: frames a second of simulated time [1/s].
         mesh: the initial mesh, without its tags.
         walls: what surrounds the body.
+        tools: rigid tools at the start.
 
     Raises:
         SceneError: it is no folder of a run with frames.
@@ -188,8 +199,8 @@ class Frames(Sequence):
         self.times, self.rate = tuple(self.about["times"]), self.about["rate"]
 
     @cached_property
-    def _body(self) -> tuple[Mesh, list[np.ndarray]]:
-        return read_body(self.run, len(self.about["walls"]))
+    def _body(self) -> tuple[Mesh, list[np.ndarray], list[tuple]]:
+        return read_body(self.run, len(self.about["walls"]), len(self.about["tools"]))
 
     @property
     def mesh(self) -> Mesh:
@@ -201,6 +212,12 @@ class Frames(Sequence):
         """What surrounds the body."""
         walls = zip(self.about["walls"], self._body[1], strict=True)
         return tuple(Wall(wall["name"], faces, wall["still"]) for wall, faces in walls)
+
+    @cached_property
+    def tools(self) -> tuple[ToolMesh, ...]:
+        """Rigid tools at the start."""
+        named = zip(self.about["tools"], self._body[2], strict=True)
+        return tuple(ToolMesh(name, points, polygons) for name, (points, polygons) in named)
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -232,9 +249,10 @@ class Frames(Sequence):
 
     def read(self, number: int) -> Frame:
         """The frame of that number."""
-        stored = read_frame(frame_path(self.run, number), self.about["fields"], self.mesh)
-        time, step = float(stored.pop("time")), int(stored.pop("step"))
-        return Frame(number, time, step, self.mesh, stored)
+        stored = read_frame(frame_path(self.run, number), self.about, self.mesh)
+        time, step, travel = float(stored.pop("time")), int(stored.pop("step")), stored.pop("tools", ())
+        tools = tuple(tool.moved(way) for tool, way in zip(self.tools, travel, strict=True))
+        return Frame(number, time, step, self.mesh, stored, tools)
 
     def code(self, number: int) -> float:
         """A frame's place on a time line of `rate` codes a second; whole numbers for evenly spaced times."""

@@ -4,6 +4,7 @@
     /Run/MaterialNodes      Points, coloured by one field, with stress, strain and flags as primvars
     /Run/AuxiliaryNodes     Points in the middle of the cells, hidden at first
     /Run/Walls/…            a Mesh for what holds or moves the body's edge
+    /Run/Tools/…            a Mesh for every rigid tool, which is moved as a whole
 
 Metres and seconds: one second of the time line is one second of the run. Bars and plane strain lie in the xy plane
 of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate is changed.
@@ -28,7 +29,8 @@ from .quantity import quantity
 from .vectors import in_space
 from .walls import WallMesh
 
-ROOT, MATERIAL, AUXILIARY, WALLS = "/Run", "/Run/MaterialNodes", "/Run/AuxiliaryNodes", "/Run/Walls"
+ROOT, MATERIAL, AUXILIARY = "/Run", "/Run/MaterialNodes", "/Run/AuxiliaryNodes"
+WALLS, TOOLS = "/Run/Walls", "/Run/Tools"
 NO_PRIMVARS = ("position", "displacement", "velocity", "density")  # in the points, or in nobody's way
 FLAGS = ("free_surface",)
 PLAYBACK = 24.0  # [frames/s], of players that show every frame
@@ -98,6 +100,9 @@ class Drawing:
             )
             for wall in frames.walls
         ]
+        if frames.tools:
+            UsdGeom.Scope.Define(stage, TOOLS)
+        self._tools = [UsdGeom.Mesh.Define(stage, f"{TOOLS}/{tool.name}") for tool in frames.tools]
 
     def describe(self) -> None:
         """Write what does not change: the stage's units and axes, ids, widths, topology."""
@@ -121,14 +126,13 @@ class Drawing:
         self._cells.describe(len(mesh.cells))
         UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         for built, prim in self._walls:
-            sizes = np.full(len(built.polygons), built.polygons.shape[1], dtype=np.int32)
-            prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(sizes))
-            prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(built.polygons.astype(np.int32).ravel()))
-            prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-            prim.CreateDoubleSidedAttr(True)
-            prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([WALL_COLOUR]))
+            _set_topology(prim, built.polygons)
             if built.wall.still:
                 self._set_wall(built, prim, mesh.nodes, Usd.TimeCode.Default())
+        for tool, prim in zip(self._frames.tools, self._tools, strict=True):
+            _set_topology(prim, tool.polygons)
+            _set_points(prim, tool.points, Usd.TimeCode.Default())
+            prim.AddTranslateOp()
 
     def add(self, frame: Frame) -> None:
         """Write a frame at its time code."""
@@ -144,6 +148,9 @@ class Drawing:
         for built, prim in self._walls:
             if not built.wall.still:
                 self._set_wall(built, prim, position, code)
+        for tool, start, prim in zip(frame.tools, self._frames.tools, self._tools, strict=True):
+            way = Gf.Vec3d(*(tool.points[0] - start.points[0]).tolist())
+            prim.GetOrderedXformOps()[0].Set(way, code)
 
     def span_time(self, codes: Sequence[float]) -> None:
         """Say from where to where the time line goes."""
@@ -152,9 +159,22 @@ class Drawing:
             self._stage.SetEndTimeCode(codes[-1])
 
     def _set_wall(self, built: WallMesh, prim: UsdGeom.Mesh, position: np.ndarray, code: Usd.TimeCode) -> None:
-        points = built.points(position).astype(np.float32)
-        prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
-        prim.CreateExtentAttr().Set(_extent(points, 0.0), code)
+        _set_points(prim, built.points(position), code)
+
+
+def _set_topology(prim: UsdGeom.Mesh, polygons: np.ndarray) -> None:
+    sizes = np.full(len(polygons), polygons.shape[1], dtype=np.int32)
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(sizes))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(polygons.astype(np.int32).ravel()))
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateDoubleSidedAttr(True)
+    prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([WALL_COLOUR]))
+
+
+def _set_points(prim: UsdGeom.Mesh, points: np.ndarray, code: Usd.TimeCode) -> None:
+    single = points.astype(np.float32)
+    prim.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(single), code)
+    prim.CreateExtentAttr().Set(_extent(single, 0.0), code)
 
 
 class NodePoints:

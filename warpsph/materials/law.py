@@ -24,6 +24,8 @@ class Law:
             for any Δt.
         flow: (σ, internals, Parameters) → (dσ/dt, d internals/dt) by that flow.
         flow_stiffness: (σ, internals, Parameters) → the rate λ [1/s] at which it decays, for the step limit.
+        shear_strength: (σ, internals, Parameters) → the shear stress [Pa] that it carries where it slips along a
+            surface, for tools that are `Rough`.
 
     Raises:
         SceneError: a function is there without the one that it needs.
@@ -35,6 +37,7 @@ class Law:
     relax: wp.Function | None = None
     flow: wp.Function | None = None
     flow_stiffness: wp.Function | None = None
+    shear_strength: wp.Function | None = None
 
     def __post_init__(self):
         if self.relax is None and self.flow is not None:

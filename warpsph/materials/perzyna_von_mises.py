@@ -103,6 +103,11 @@ def _law(space: Space) -> Law:
         return wp.where(p.residual > Y, p.residual, Y)  # unlike a maximum, keeps a NaN
 
     @wp.func
+    def shear_strength(sigma: space.types.stress, internals: scalar, p: PerzynaParameters):
+        """Y/√3, that of simple shear."""
+        return current_yield_size(internals[0], p) / wp.sqrt(real(3.0))
+
+    @wp.func
     def flow(sigma: space.types.stress, internals: scalar, p: PerzynaParameters):
         q = space.stress.von_mises(sigma)
         Y = current_yield_size(internals[0], p)
@@ -172,4 +177,5 @@ def _law(space: Space) -> Law:
         relax=relax,
         flow=flow,
         flow_stiffness=flow_stiffness,
+        shear_strength=shear_strength,
     )

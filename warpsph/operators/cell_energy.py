@@ -15,6 +15,7 @@ from ..state.cell_body import (
     ENTRIES,
     FLOW,
     FORCES,
+    REMADE,
     CellBody,
     cell_node_types,
 )
@@ -28,6 +29,7 @@ class CellEnergy:
         body: the body.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
         loads: work of the loads [J], a number a loaded cell.
+        tools: work of the tools [J], a number a node.
 
     Attributes:
         initial: kinetic and elastic energy at t = 0 [J], from the first step on as the leapfrog has them.
@@ -35,8 +37,9 @@ class CellEnergy:
         kernels: all that it launches.
     """
 
-    def __init__(self, body: CellBody, *, rough_loss: wp.array, loads: wp.array):
-        self._body, self._rough_loss, self._loads, launcher = body, rough_loss, loads, body.launcher
+    def __init__(self, body: CellBody, *, rough_loss: wp.array, loads: wp.array, tools: wp.array):
+        self._body, self._rough_loss, launcher = body, rough_loss, body.launcher
+        self._loads, self._tools = loads, tools
         n, device = body.nodes.point.shape[0], launcher.device
         self._sums, self._opening = _sum_kernel(body.space), _opening_kernel(body.space, body.law)
         self._totals = wp.zeros(-(-n // SHARE), dtype=Totals, device=device)
@@ -65,9 +68,11 @@ class CellEnergy:
             flow=booked[FLOW],
             viscous=self._rough.of(self._rough_loss),
             damping=booked[DAMPING],
+            remade=booked[REMADE],
             gravity=booked[FORCES],
             loads=float(self._loads.numpy().sum()),
             walls=booked[CONDITIONS],
+            tools=float(self._tools.numpy().sum()),
             initial=self.initial,
         )
 

@@ -11,6 +11,7 @@ from ..physics.space import Space
 from ..scene.face_loads import surface_rule
 from ..state.cell_body import CellBody, cell_node_types
 from ..state.clock import END, Clock
+from .face_shares import face_function
 
 
 @cache
@@ -80,25 +81,10 @@ class LoadedFaces:
 @cache
 def load_kernel(space: Space, kind: CellKind):
     """Of each cell with loads: what they do to its corners, and their work since they were looked at before."""
-    real, types, d = space.real, space.types, space.dim
-    Loaded, CellNodes, rule = loaded_type(space), cell_node_types(space)[1], surface_rule(kind)
-    corners, size, points = kind.corners, len(kind.faces[0]), len(rule)
-    weights = space.vec(points)(*[weight for weight, _, _ in rule])
-    shares = space.mat(points, size)(*np.ravel([share for _, share, _ in rule]).tolist())
-    axes = max(1, d - 1)  # Warp has no matrix without columns
-    slopes = np.zeros((points, size, axes))
-    slopes[:, :, : d - 1] = [slope for _, _, slope in rule]
-    Along = space.mat(axes, d)
-    slope_at = space.mat(points * size, axes)(*slopes.ravel().tolist())
-
-    @wp.func
-    def area_vector(along: Along):
-        if wp.static(d == 1):
-            return types.vector(real(1.0))
-        elif wp.static(d == 2):
-            return types.vector(along[0, 1], -along[0, 0])
-        else:
-            return wp.cross(along[0], along[1])
+    real, types = space.real, space.types
+    Loaded, CellNodes = loaded_type(space), cell_node_types(space)[1]
+    corners, size, points = kind.corners, len(kind.faces[0]), len(surface_rule(kind))
+    weights, shares, slope_at, Along, area_vector = face_function(space, kind)
 
     @forward_kernel
     def load(
@@ -115,7 +101,8 @@ def load_kernel(space: Space, kind: CellKind):
         row = first + wp.tid()
         c, done = table.cell[row], real(0.0)
         for k in range(wp.static(corners)):
-            done += wp.dot(own[row, k], nodes.half[corner_nodes[c, k]].v)
+            i = corner_nodes[c, k]
+            done += wp.dot(own[row, k], nodes.half[i].v)
             own[row, k] = types.vector()
         for at in range(table.first[row], table.first[row + 1]):
             factor = drive[END, table.function[at]]
@@ -136,7 +123,8 @@ def load_kernel(space: Space, kind: CellKind):
                     p = table.corner[at, k]
                     own[row, p] = own[row, p] + (factor * weights[q] * shares[q, k]) * pushed
         for k in range(wp.static(corners)):
-            done += wp.dot(own[row, k], nodes.half[corner_nodes[c, k]].v)
+            i = corner_nodes[c, k]
+            done += wp.dot(own[row, k], nodes.half[i].v)
             forces[c, k] = forces[c, k] + own[row, k]
         work[row] = work[row] + wp.float64(real(0.5) * time_step[0] * done)
 

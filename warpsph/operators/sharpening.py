@@ -135,7 +135,8 @@ def stress_mean_kernel(space: Space, kind: CellKind):
         packed_means(means)
         mean = space.types.stress()
         for k in range(wp.static(kind.corners)):
-            mean += space.phi.stress(nodes.point[corners[c, k]].phi)
+            i = corners[c, k]
+            mean += space.phi.stress(nodes.point[i].phi)
         means.stress[c] = (real(per_corner) * means.weight[c]) * mean
 
     return stress_mean

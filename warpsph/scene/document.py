@@ -20,13 +20,16 @@ from ..validate import FunctionOfTime, choice
 from .condition import Condition, EdgeCondition
 from .free_surface import FreeSurface
 from .functions import Linear, Pulse, Ramp, Table
+from .interface import Interface
 from .load import Load
 from .numerics import Numerics
-from .output import EdgeForce, NodeValue, Output, Probe, Reaction
+from .output import EdgeForce, NodeValue, Output, Probe, Reaction, ToolForce, ToolImpulse, ToolTorque
 from .registry import MATERIALS
+from .remade import Remade
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
 from .shape import Mapped, Placed, Shape
+from .tool import Tool
 
 FREE = "free"
 SELECTIONS = ("on", "first", "second", "inner")  # fields in which a text is the name of an edge
@@ -34,6 +37,7 @@ TABLES = ("tags",)  # fields that hold a table of values by names of the user's
 # Fields that hold one class only need no `type`.
 PLAIN = {
     "body_force": BodyForce,
+    "cells": Remade,
     "free_surface": FreeSurface,
     "numerics": Numerics,
     "output": Output,
@@ -205,12 +209,17 @@ def _is_known(kind: type) -> bool:
 
 @cache
 def _parts() -> dict[str, type]:
-    found = [Linear, Ramp, Pulse, Table, NodeValue, EdgeForce, Reaction, *PLAIN.values()]
-    waiting = [Shape, Condition, Selection]
+    found = [Linear, Ramp, Pulse, Table, NodeValue, EdgeForce, Reaction]
+    found += [ToolForce, ToolImpulse, ToolTorque, *PLAIN.values()]
+    waiting = [Shape, Condition, Selection, Tool, Interface]
     while waiting:
         kind = waiting.pop()
         waiting += kind.__subclasses__()
         own = kind.__module__.partition(".")[0] == __package__.partition(".")[0]
-        if own and is_dataclass(kind) and kind not in (Condition, EdgeCondition, Load, Mapped, where):
+        if (
+            own
+            and is_dataclass(kind)
+            and kind not in (Condition, EdgeCondition, Load, Mapped, where, Tool, Interface)
+        ):
             found.append(kind)
     return {kind.__name__: kind for kind in found}

@@ -43,6 +43,10 @@ def _parts(scene: Scene) -> Iterator[tuple[str, object]]:
             if entry.name != "functions":
                 yield f"{name}.{entry.name}", getattr(table, entry.name)
         yield f"{name}.functions", np.array([_sample(function, times) for function in table.functions])
+    for tool in scene.tools:
+        own = {name: value for name, value in vars(tool).items() if name != "velocity"}
+        motion = [_sample(function, times) for function in tool.velocity or ()]
+        yield "tool", (type(tool).__name__, own, motion)
     yield from (("velocity", scene.initial_velocity), ("stress", scene.initial_stress))
     force = scene.body_force
     yield "body_force", None if force is None else np.array([force(t) for t in times])

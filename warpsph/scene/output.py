@@ -55,7 +55,7 @@ class Probe:
 
     def check(self, scene: Scene) -> None:
         """Raise `SceneError` when a function of ours asks for something that the scene does not have."""
-        if isinstance(self.function, NodeValue | EdgeForce | Reaction):
+        if isinstance(self.function, NodeValue | EdgeForce | Reaction | ToolForce | ToolTorque):
             self.function.check(scene)
 
 
@@ -196,6 +196,81 @@ class Reaction:
         return float(
             -reactions[: len(simulation.scene.boundary.nodes)][self._rows(simulation.scene), self.axis].sum()
         )
+
+
+@dataclass(frozen=True)
+class ToolForce:
+    """Force of the body on a tool along an axis, the mean of the last step: [N] in 3D, [N/m] in plane strain.
+
+    What tools get, the body's momentum lacks, to rounding. Ground that carries a body gets its weight, downwards.
+
+    Args:
+        tool: its name.
+        axis: component, counted from 0.
+    """
+
+    tool: str
+    axis: int
+
+    def __post_init__(self):
+        _check_tool_probe(self)
+
+    def check(self, scene: Scene) -> None:
+        """Raise `SceneError` when there is no such tool or axis."""
+        _tool_number(self, scene)
+        index(f"{type(self).__name__}.axis", self.axis, below=scene.mesh.dim)
+
+    def __call__(self, simulation) -> float:
+        return float(simulation.stepper.tools.force(_tool_number(self, simulation.scene))[self.axis])
+
+
+@dataclass(frozen=True)
+class ToolImpulse(ToolForce):
+    """What the body has given a tool along an axis since the start [N s], in plane strain [N s/m].
+
+    Its differences are mean forces between samples, where `ToolForce` sees the last step alone.
+    """
+
+    def __call__(self, simulation) -> float:
+        return float(simulation.stepper.tools.impulse(_tool_number(self, simulation.scene))[self.axis])
+
+
+@dataclass(frozen=True)
+class ToolTorque:
+    """Torque of the body on a tool, the mean of the last step: [N m] in 3D, [N] in plane strain.
+
+    Args:
+        tool: its name.
+        axis: about x (0), y (1) or z (2), in plane strain z alone, through the tool's middle; of a `Plane` through
+            its point that is nearest to the middle of the body at the start.
+    """
+
+    tool: str
+    axis: int = 2
+
+    def __post_init__(self):
+        _check_tool_probe(self)
+
+    def check(self, scene: Scene) -> None:
+        """Raise `SceneError` when there is no such tool or axis."""
+        _tool_number(self, scene)
+        if scene.mesh.dim < 3 and not (scene.mesh.dim == 2 and self.axis == 2):
+            raise SceneError("ToolTorque.axis", self.axis, "in the plane it must be 2, and a bar has no torques")
+        index("ToolTorque.axis", self.axis, below=3)
+
+    def __call__(self, simulation) -> float:
+        return float(simulation.stepper.tools.torque(_tool_number(self, simulation.scene))[self.axis])
+
+
+def _check_tool_probe(probe: ToolForce | ToolTorque) -> None:
+    own = type(probe).__name__
+    instance(f"{own}.tool", probe.tool, str, "the name of a tool")
+    index(f"{own}.axis", probe.axis)
+
+
+def _tool_number(probe: ToolForce | ToolTorque, scene: Scene) -> int:
+    names = [tool.name for tool in scene.tools]
+    return names.index(choice(f"{type(probe).__name__}.tool", probe.tool, names))
 
 
 @dataclass(frozen=True, kw_only=True)

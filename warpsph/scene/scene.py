@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import SceneError
+from ..mesh.inside import inside
 from ..mesh.mesh import Mesh
 from ..validate import (
     TimeFunction,
@@ -28,9 +29,11 @@ from .load import Load
 from .material import Material
 from .numerics import Numerics
 from .output import Output
+from .remade import Remade
 from .resolve import BoundaryTable, resolve
 from .shape import Shape
 from .thickness import check_thickness
+from .tool import TOUCHING, Tool
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ class Scene:
         duration: simulated time [s].
         conditions: boundary conditions; an edge without one is free of traction (with a published velocity
             scheme it keeps whatever traction it has).
+        tools: rigid ground and tools, which the body does not pass, such as `Plane` and `Cylinder`.
         free_surface: for a published velocity scheme, frees the edge that no condition moves of its tractions, as
             it moves and deforms; or None.
         body_force: uniform body force, or None.
@@ -76,6 +80,7 @@ class Scene:
             (bar s11; plane strain s11, s22, s12, s33; solid s11, s22, s33, s12, s13, s23); zero unless given.
         large_displacements: whether nodes move and stresses turn with them (updated Lagrangian); if not, the
             initial configuration is kept (small strains).
+        cells: cells that are made anew as the body flows, `Remade()`, or None.
         numerics: choices of the discretisation.
         output: what to record.
         name: a short name, for messages and results.
@@ -99,12 +104,14 @@ class Scene:
     material: Material
     duration: float
     conditions: tuple[Condition, ...] = ()
+    tools: tuple[Tool, ...] = ()
     free_surface: FreeSurface | None = None
     body_force: BodyForce | None = None
     damping: float = 0.0
     velocity: Callable | None = None
     stress: Callable | None = None
     large_displacements: bool = True
+    cells: Remade | None = None
     numerics: Numerics = field(default_factory=Numerics)
     output: Output = field(default_factory=Output)
     name: str = "scene"
@@ -131,8 +138,11 @@ class Scene:
         if self.free_surface is not None:
             self._check_free_surface()
         self.numerics.scheme.check_cells(self.mesh)
-        self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
+        self.numerics.check_support(self.mesh)
         self._check_loads()
+        self._check_tools()
+        if self.cells is not None:
+            instance("cells", self.cells, Remade, "Remade(…) or None").check(self)
         self.output.check(self)
         check_thickness(self.mesh, self.boundary, self._freed_nodes())
         _ = self.initial_velocity, self.initial_stress, self.initial_internals
@@ -174,6 +184,41 @@ class Scene:
                 )
                 raise SceneError(f"conditions[{index}]", load, allowed)
         _ = self.loads
+
+    def _check_tools(self) -> None:
+        allowed = "a sequence of tools such as Plane((0, 0), (0, 1))"
+        object.__setattr__(self, "tools", listed("tools", self.tools, Tool, allowed))
+        names = [tool.name for tool in self.tools]
+        for index, tool in enumerate(self.tools):
+            field = f"tools[{index}]"
+            if not self.numerics.scheme.nodal_forces:
+                scheme = self.numerics.velocity_scheme
+                raise SceneError(field, tool, f"velocity_scheme {scheme} has no forces on nodes; take cells")
+            if not self.large_displacements:
+                raise SceneError(field, tool, "tools meet nodes where they are; take large_displacements=True")
+            tool.check(self.mesh.dim)
+            if names.index(tool.name) < index:
+                raise SceneError(f"{field}.name", tool.name, "another tool has this name")
+            form = tool.form(self.mesh.dim)
+            if not form.plane and inside(self.mesh, form.centre):
+                raise SceneError(field, tool, "at the start it is inside the body")
+            depth = -form.distance(self.mesh.nodes)
+            if depth.max() > TOUCHING * self.mesh.spacing:
+                node = int(depth.argmax())
+                at = tuple(round(x, 6) for x in self.mesh.nodes[node].tolist())
+                raise SceneError(field, tool, f"at the start node {node} at {at} is {depth[node]:.4g} m inside it")
+
+    @cached_property
+    def tool_functions(self) -> tuple[tuple[TimeFunction, ...], np.ndarray]:
+        """The distinct functions of time that move the tools, and which are each tool's velocity, shape (k, d)."""
+        rest = (0.0,) * self.mesh.dim
+        velocities = [rest if tool.velocity is None else tool.velocity for tool in self.tools]
+        functions: list[TimeFunction] = []
+        for part in (part for velocity in velocities for part in velocity):
+            if part not in functions:
+                functions.append(part)
+        which = [[functions.index(part) for part in velocity] for velocity in velocities]
+        return tuple(functions), np.array(which, dtype=np.int64).reshape(len(self.tools), self.mesh.dim)
 
     @cached_property
     def mesh(self) -> Mesh:

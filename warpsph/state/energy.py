@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 
 UNITS = {1: "J/m²", 2: "J/m", 3: "J"}  # of a bar for its section, of plane strain for its thickness
 
-TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping")  # where it is, or went
-LOSSES = TAKEN[2:]
-GIVEN = ("gravity", "loads", "walls")  # where it came from
+TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping", "remade")  # where it is, or went
+LOSSES = TAKEN[2:5]
+GIVEN = ("gravity", "loads", "walls", "tools")  # where it came from
 COLUMNS = (*TAKEN, *GIVEN, "unaccounted")
 
 
@@ -22,9 +22,11 @@ class Energy:
         flow: taken by the material's flow.
         viscous: taken by the viscosity of the scheme.
         damping: taken by the scene's damping.
+        remade: taken by cells that were made anew.
         gravity: work of the body force on the body.
         loads: work of tractions on the body.
         walls: work of the conditions on velocities on the body.
+        tools: work of the tools on the body: their friction takes it, where nodes land as well.
         initial: kinetic and elastic at the start.
     """
 
@@ -33,9 +35,11 @@ class Energy:
     flow: float
     viscous: float
     damping: float
+    remade: float
     gravity: float
     loads: float
     walls: float
+    tools: float
     initial: float
 
     @property

@@ -14,12 +14,15 @@ from ..mesh.mesh import Mesh
 from ..operators.cell_energy import CellEnergy
 from ..operators.cell_limit import CellLimit
 from ..operators.cell_numbers import numbers_of
-from ..operators.cell_passes import corner_share, force_kernel, strain_kernel
+from ..operators.cell_passes import BENT, BENT_SHARE, corner_share, force_kernel, strain_kernel
 from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
+from ..operators.node_limit import NodeLimit
 from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
+from ..operators.remaking import Remaking
 from ..operators.sharpening import Sharpening
+from ..operators.tools import Tools
 from ..physics.space import Space
 from ..scene.scene import Scene
 from ..scene.scheme import Scheme
@@ -42,15 +45,19 @@ class CellStepper(Stepper):
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
+        remaking: makes cells anew.
+        tools: the tools, what they do to the body, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
     """
 
     def __init__(self, scene: Scene, space: Space, launcher: Launcher):
         driven = scene.boundary.functions
-        clock = Clock(scene.body_force, (*driven, *scene.loads.functions), space, launcher)
+        clock = Clock(
+            scene.body_force, (*driven, *scene.loads.functions, *scene.tool_functions[0]), space, launcher
+        )
         c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
-        device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
+        device, real, cells = launcher.device, space.real, body.corners.shape[0]
         n, moves = len(scene.mesh.nodes), scene.large_displacements
         self.conditions = held_table(scene.boundary, n, space=space, device=device, clock=clock)
         self._numbers = wp.zeros(
@@ -60,19 +67,22 @@ class CellStepper(Stepper):
         self.reactions = wp.zeros(max(1, len(scene.boundary.nodes)), dtype=space.types.vector, device=device)
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self.loads = LoadedFaces(body, clock, len(driven))
-        self._limit = CellLimit(body, clock)
-        self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work)
-        kind, slots, share = body.kind, body.slots, corner_share(c)
+        offset = len(driven) + len(scene.loads.functions)
+        self._limit = (CellLimit if scene.cells is None else NodeLimit)(body, clock)
+        self.remaking = remaking = Remaking(body, clock, self._limit)
+        self.tools = Tools(body, clock, offset, self.conditions, remaking.outline)
+        self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work, tools=self.tools.work)
+        kind, slots, self._kappa = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
-        self._strain = strain_kernel(space, kind, body.law.flows, share)
+        self._strain = strain_kernel(space, kind, body.law.flows)
         self._rate = rate_kernel(space, kind, slots)
         self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=sharpening.on)
         self._force = force_kernel(space, kind, body.law, sharpening.on)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
-        super().__init__(launcher, clock, parts=(self._limit,))
-        for part in (clock, sharpening, self.loads, self._limit, self._energy):
+        super().__init__(launcher, clock, parts=(self._limit, remaking) if remaking.on else (self._limit,))
+        for part in (clock, sharpening, self.loads, self.tools, remaking, self._limit, self._energy):
             kernels += part.kernels
         load_kernels(kernels, device)
         self._limit.refresh()
@@ -116,6 +126,8 @@ class CellStepper(Stepper):
         self.loads.add(self._forces)
         inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
+        self.tools.settle()
+        self.remaking.count()
         clock.tick()
 
     def _rates(self) -> None:
@@ -124,7 +136,8 @@ class CellStepper(Stepper):
         nodes, points, corners = body.nodes, body.nodes.point, body.corners
         inputs = [self.conditions, body.scene.damping, clock.time_step, nodes]
         launch(self._kick, points, inputs, gathers=False)
-        launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
+        self.tools.stop()
+        launch(self._strain, corners, [self._kappa, corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
         self._sharpening.weigh()
@@ -135,10 +148,19 @@ def spacing(mesh: Mesh) -> float:
 
     In space 0.975 of it. ω_T is that of a wave along one direction; a free body two cells thick that is nearly
     incompressible swells along three at once: waves of 3 × 2 × 2 cubes grow from a Courant number of 0.785 on.
+    Σ_j ∇N_j ⊗ ∇N_j of a regular cell is alike in every direction: what counts is the least of a cell's stretches.
     """
-    gradients = np.array(mesh.kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
-    largest = np.linalg.norm(gradients, 2, axis=(1, 2)).max()
-    return float((0.975 if mesh.dim == 3 else 1.0) * 2.0 / (np.sqrt(mesh.kind.corners) * largest))
+    kind = mesh.kind
+    regular = np.linalg.norm(np.array(kind.gradients) @ np.linalg.inv(kind.regular), 2)
+    distance = mesh.smallest_distance()
+    if kind.modes:
+        bent, bends, gradients = mesh.bent_cells()
+        if len(bent):
+            share = BENT_SHARE * np.minimum(bends / BENT**2, 1.0)
+            more = share**2 * (1.0 + bends) * (gradients**2).sum(axis=(1, 2))
+            stretches = mesh.least_stretches()[bent]
+            distance = min(distance, (stretches / np.sqrt(1.0 + more * (stretches / regular) ** 2)).min())
+    return float((0.975 if mesh.dim == 3 else 1.0) * 2.0 * distance / (np.sqrt(kind.corners) * regular))
 
 
 COURANT_LIMIT = 0.8  # tests/test_stability.py

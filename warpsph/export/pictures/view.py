@@ -13,16 +13,20 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ...mesh.mesh import Mesh
+from ...simulation.simulation import Simulation
 from ..colours import COLOUR_MAP, beyond, percentiles, span_of
 from ..quantity import Quantity, Snapshot
+from ..tool_meshes import ToolMesh, tools_now
 from .figures import DARK, GREY, draw_cells, new_figure
 
 MARGIN = 0.04
+TOOL = "#c9c9c9"
 
 
 @dataclass(frozen=True)
@@ -86,11 +90,17 @@ class View:
             axes.set_ylim(self.values[0] - room, self.values[1] + room)
             axes.grid(alpha=0.3)
         elif len(self.low) == 2:
+            outlines = [tool.outline for tool in _tools(frame)]
+            axes.add_collection(PolyCollection(outlines, facecolor=TOOL, edgecolor="black", linewidth=0.6))
             draw_cells(axes, frame.mesh.with_nodes(position), values, span=self.span, **style)
             axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
         else:
             colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.mesh, values)))
             _solid(axes, frame.mesh, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
+            for tool in _tools(frame):
+                if np.ptp(tool.points, axis=0).max() < 2.0 * (self.high - self.low).max():  # planes hide the body
+                    faces = tool.points[tool.polygons]
+                    axes.add_collection3d(Poly3DCollection(faces, facecolors=TOOL, linewidths=0.0, alpha=0.3))
             axes.set(
                 xlim=(self.low[0], self.high[0]),
                 ylim=(self.low[1], self.high[1]),
@@ -139,6 +149,10 @@ def magnification(displacement: float, size: float) -> float:
     wanted = 0.08 * size / displacement
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted))
+
+
+def _tools(frame: Snapshot) -> tuple[ToolMesh, ...]:
+    return tools_now(frame) if isinstance(frame, Simulation) else frame.tools
 
 
 def _of_faces(mesh: Mesh, values: np.ndarray) -> np.ndarray:
