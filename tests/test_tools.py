@@ -17,6 +17,7 @@ from warpsph import (
     Cylinder,
     Elastic,
     Fixed,
+    GivenMesh,
     Glued,
     History,
     Linear,
@@ -202,6 +203,42 @@ def test_no_node_is_behind_a_surface(name):
     assert met > 0.0
 
 
+def test_a_node_that_lands_is_on_the_surface_at_once():
+    simulation = Simulation(falls(), device="cpu", threads=1)
+    while not simulation.stepper.tools.impulse(0).any():
+        simulation.step()
+    lowest = simulation.field("position")[:, 1].min()
+    assert -simulation.field("displacement")[:, 1].min() + 1e-6 > 0.01 and abs(lowest) < 1e-12
+
+
+def spike():
+    """A narrow triangle of triangles, its tip down."""
+    rows = [[(0.02 * (k - 0.5 * r), 0.05 * r) for k in range(r + 1)] for r in range(5)]
+    first = [r * (r + 1) // 2 for r in range(5)]
+    up = [(first[r] + k, first[r + 1] + k + 1, first[r + 1] + k) for r in range(4) for k in range(r + 1)]
+    down = [(first[r] + k, first[r] + k + 1, first[r + 1] + k + 1) for r in range(4) for k in range(r)]
+    return GivenMesh(points=[point for row in rows for point in row], cells=up + down)
+
+
+@pytest.mark.parametrize("steep", [1.0, 2.0, 3.0])
+def test_a_tip_stays_between_two_planes(steep):
+    """It falls into a corner of 90 to 37 degrees: both planes push one node."""
+    sides = (
+        Plane((0.0, -0.05), (steep, 1.0), interface=Coulomb(0.2), name="left"),
+        Plane((0.0, -0.05), (-steep, 1.2), name="right"),
+    )
+    scene = falls(shape=spike(), tools=sides, body_force=BodyForce((1.0, -30.0)), duration=0.3)
+    simulation, deepest = Simulation(scene, device="cpu", threads=1), 0.0
+    for k in range(1, 101):
+        simulation.run(until=k * scene.duration / 100)
+        gaps = [side.form(2).distance(simulation.field("position")).min() for side in sides]
+        deepest = min(deepest, *gaps)
+    assert deepest > -1e-4 * scene.mesh.spacing
+    assert all(np.abs(simulation.stepper.tools.impulse(t)).max() > 0.0 for t in (0, 1))
+    balance = simulation.energy()
+    assert balance.tools < 0.0 and abs(balance.unaccounted) < 0.05 * balance.largest
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_what_tools_get_the_body_lacks(name):
     """Momentum: what came in by gravity and conditions, less what tools got, to 1e-12 of what was exchanged."""
@@ -303,7 +340,10 @@ def test_a_plane_that_presses_is_a_prescribed_velocity():
     bottom = Roller(edge("bottom"))
     moved = PrescribedVelocity(edge("top"), (None, Linear(-8.0)))
     plate = Plane((0.0, 0.6), (0.0, -1.0), velocity=(0.0, Linear(-8.0)))
-    compared(Scene(conditions=[bottom], tools=(plate,), **common), Scene(conditions=[bottom, moved], **common))
+    names = ("displacement", "stress", "velocity")
+    compared(
+        Scene(conditions=[bottom], tools=(plate,), **common), Scene(conditions=[bottom, moved], **common), names
+    )
 
 
 @pytest.mark.parametrize("interface", [Glued(), Rough()])

@@ -208,8 +208,9 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         P = unit()
         if held.row[i] >= 0:
             P = held.projector[held.row[i]]
-        v, met = before + vector(), wp.int32(0)
-        for sweep in range(wp.static(sweeps)):
+        v, met, rounds = before + vector(), wp.int32(0), wp.int32(sweeps)
+        for sweep in range(rounds):
+            pushes = wp.int32(0)
             for t in range(touched.shape[1]):
                 if wp.static(not ends) or touched[row, t] == 1:
                     at = middle(t, table, travel)
@@ -222,7 +223,7 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         else:
                             least = wp.max(real(-RETURN) * (gap + table.slack[t]) / dt, real(0.0))
                     stopped = wp.where(table.glued[t] == 1, real(ENDLESS), real(0.0))
-                    if wp.static(strong and sweep == 0):
+                    if wp.static(strong) and sweep == 0:
                         area = wp.max(-wp.dot(shares[i], n), real(0.0))
                         stopped += strength(table.strength[t], sigma, own, material) * area * h / mass
                     pressed, lag = contacts.pressed[row, t] + real(0.0), table.lag[t] + real(0.0)
@@ -230,11 +231,11 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         pressed = real(0.0)
                         if gap <= table.slack[t]:
                             lag = real(0.0)
-                    if wp.static(sweep > 0):
+                    if sweep > 0:
                         lag = real(0.0)
                     friction = table.friction[t]
                     w, force, meets = meet(v, P, V, n, least, pulls, friction, pressed, h, lag, stopped)
-                    if wp.static(sweep == 0):
+                    if sweep == 0:
                         if pressed > real(0.0) or meets == 1:
                             contacts.pressed[row, t] = force
                         if wp.static(not ends) and force > real(0.0):
@@ -246,10 +247,16 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         contacts.total[row, t] = contacts.total[row, t] + exactly(push)
                         v = w
                         met = wp.int32(1)
+                        pushes = wp.int32(1)
                         if wp.static(not ends):
                             meeting[row] = 1
                     if wp.static(not ends):
-                        touched[row, t] = meets if wp.static(sweep == 0) else wp.max(meets, touched[row, t])
+                        if sweep == 0:
+                            touched[row, t] = meets
+                        elif meets == 1:
+                            touched[row, t] = 1
+            if pushes == 0:
+                break
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
             contacts.settled[row] = pushed
