@@ -26,6 +26,7 @@ from warpsph import (
     Plane,
     PrescribedVelocity,
     Probe,
+    Ramp,
     Roller,
     Rough,
     Scene,
@@ -541,6 +542,26 @@ def test_probes_of_tools_are_columns_of_the_history():
     assert history["torque"][-1] == tools.torque(1)[2] != 0.0
     assert history["given"][-1] == tools.impulse(0)[1] < 0.0
     assert history["energy.tools"][-1] == simulation.energy().tools
+
+
+@pytest.mark.parametrize("steps", [2_000, pytest.param(1_000_000, marks=pytest.mark.long)])
+def test_a_heap_at_rest_does_not_creep(steps):
+    """Of soil, on ground that leans a little: held by friction, node by node."""
+    scene = Scene(
+        shape=Box((0.8, 0.2), 0.1, origin=(-0.4, 0.0)).mapped(lambda x, y: (x * (1.0 - 1.5 * y), y)),
+        material=SOIL,
+        body_force=BodyForce((0.5, -G), Ramp(0.5)),
+        damping=20.0,
+        tools=(replace(GROUND, interface=Coulomb(0.4)),),
+        duration=1e5,
+    )
+    simulation = Simulation(scene, device="cpu", threads=1)
+    simulation.run(until=6.0)
+    before, weight = simulation.field("position"), simulation.field("mass").sum() * np.array([0.5, -G])
+    simulation.run(until=simulation.time + steps * simulation.time_step_limit)
+    assert simulation.field("position") == pytest.approx(before, abs=1e-14)
+    assert np.abs(simulation.field("velocity")).max() < 1e-14
+    assert simulation.stepper.tools.force(0) == pytest.approx(weight, rel=1e-10)
 
 
 # Bits
