@@ -32,7 +32,7 @@ class StandardSPH:
 
     def __init__(self, scene, smoothing_ratio):
         mesh, material = scene.mesh, scene.material
-        volume = mesh.node_volumes()[1]
+        volume = mesh.node_weights()
         self.time, self.blown = 0.0, False
         self.x, self.v = mesh.nodes.copy(), scene.initial_velocity.copy()
         self.stress = scene.initial_stress.copy()

@@ -117,7 +117,7 @@ class Energies:
     def __init__(self, simulation, every=1, observe=lambda simulation: None, bending=False):
         scene = simulation.scene
         self._every, self._also = every, observe
-        self._volume = scene.mesh.node_volumes()[0]
+        self._volume = scene.mesh.node_volumes()
         self._mass = scene.material.density * self._volume
         self._compliance = compliance(scene)
         self._cells = scene.mesh.cells if bending else np.arange(len(self._volume))[:, None]

@@ -10,8 +10,8 @@ import warpsph
 
 PACKAGE = Path(warpsph.__file__).parent
 ROOMS = (
-    *("errors", "validate", "mesh", "analysis", "scene", "device", "physics", "materials", "state", "operators"),
-    *("step", "storage", "simulation", "export", "cli", "report"),
+    *("errors", "validate", "mesh", "analysis", "scene", "device", "physics", "materials", "state", "remaking"),
+    *("operators", "step", "storage", "simulation", "export", "cli", "report"),
 )
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
 
@@ -64,3 +64,18 @@ def test_contributing_lists_the_rooms_in_their_order():
     rows = re.findall(r"^\| (`warpsph/[^|]*) \|", text, re.MULTILINE)
     rooms = [room for row in rows for room in re.findall(r"`warpsph/(\w+)[./]", row)]
     assert rooms == [*ROOMS, "frames", "public", "__main__"]
+
+
+def statics_of_loops(path):
+    """Lines where `wp.static` names the variable of a loop around it."""
+    for loop in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name):
+            for call in (node for node in ast.walk(loop) if isinstance(node, ast.Call)):
+                named = {node.id for part in call.args for node in ast.walk(part) if isinstance(node, ast.Name)}
+                if ast.unparse(call.func) == "wp.static" and loop.target.id in named:
+                    yield call.lineno
+
+
+def test_no_kernel_has_to_be_built_to_be_found_in_the_cache():
+    """Warp knows what `wp.static` of a loop's variable is only when it has built the kernel, at every start."""
+    assert not [(path, line) for path in FILES for line in statics_of_loops(path)]

@@ -62,6 +62,12 @@ def scene(**changed):
     return Scene(**{"shape": PLATE, "material": Elastic(**ELASTIC), "duration": 1.0, **changed})
 
 
+def dented(x, y):
+    """The node in the middle of four cells is pushed into the first, which keeps a volume but no shape."""
+    inner = (x == 0.2) & (y == 0.2)
+    return np.where(inner, 0.06, x), np.where(inner, 0.06, y)
+
+
 def refused(build, field, value, allowed):
     """Assert that a build raises one line "field = value is not allowed: … allowed …"."""
     with pytest.raises(SceneError) as caught:
@@ -173,6 +179,7 @@ SHAPES = [
     (lambda: PLATE.mapped(3), "mapped.function", 3, "a function of position"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: ((x - 0.6) ** 2, y))), "mapped.function", None, "no folds"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: (-x, y))), "mapped.function", None, "volume positive"),
+    (lambda: scene(shape=Box((0.4, 0.4), 0.2).mapped(dented)), "mapped.function", None, "at each corner"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: x)), "mapped.function", None, "must return 2 finite"),
     (lambda: scene(shape=PLATE.mapped(lambda x, y: (NAN * x, y))), "mapped.function", None, "2 finite"),
 ]
@@ -410,7 +417,7 @@ def test_round_support_must_reach_further_on_a_stretched_lattice():
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_courant_number_up_to_the_wave_limit(kernel):
-    """2 √m₂ of sums over neighbours; of cells 0.85."""
+    """2 √m₂ of sums over neighbours; of cells 0.8."""
     sums = {"velocity_scheme": "taylor", "kernel": kernel}
     limit = courant_limit(scene(numerics=Numerics(**sums)))
 
@@ -419,8 +426,8 @@ def test_courant_number_up_to_the_wave_limit(kernel):
 
     assert build(1.0) == pytest.approx(limit * 0.25 / Elastic(**ELASTIC).wave_speed(2), rel=1e-12)
     refused(lambda: build(1.001), "courant", limit * 1.001, f"kernel {kernel} .* stable up to {limit:.4g}")
-    too_large = scene(numerics=Numerics(courant=0.86))
-    refused(lambda: time_step_limit(too_large), "courant", 0.86, "cells .* stable up to 0.85")
+    too_large = scene(numerics=Numerics(courant=0.81))
+    refused(lambda: time_step_limit(too_large), "courant", 0.81, "cells .* stable up to 0.8")
 
 
 def test_time_step_up_to_the_wave_limit():

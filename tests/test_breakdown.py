@@ -69,6 +69,16 @@ def test_a_folded_cell_is_noted_and_named_with_its_nodes():
     )
 
 
+def test_a_run_ends_in_the_step_in_which_a_cell_folds():
+    """All nodes fly through the left side, fast enough to pass each other in one step."""
+    scene = Scene(
+        shape=Box((1.0, 1.0), 0.25), material=SOFT, duration=1.0, velocity=lambda x, y: (-1e4 * x, 0.0 * y)
+    )
+    simulation = Simulation(scene, device="cpu")
+    with pytest.raises(BreakdownError, match=r"^cell \d+ folded, nodes .* in step 1 "):
+        simulation.run()
+
+
 @pytest.mark.filterwarnings("error")
 def test_positions_beyond_all_numbers_are_named_without_a_warning():
     """Lengths and volumes of the cells overflow."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from warpsph import Box, Elastic, Fixed, Numerics, Roller, Scene, Simulation, edge
+from warpsph.step.cells import spacing
 
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
 TINY = 1e-6  # of velocities, so that strains are small
@@ -104,7 +105,8 @@ def test_sharpening_is_that_of_the_cells_however_a_body_was_made(cells):
     advance = 0.8 * (1.0 if cells == "lattice" else 2.0 / 3.0)  # triangles: the Courant number's Δx is ⅔ of it
     for factor in (1.0, 10.0, 0.1):
         mesh = box.mapped(lambda x, y, f=factor: (f * x, f * y)).mesh()
-        assert Numerics().sharpening_of(mesh, 1.0) == pytest.approx(2.0 / 3.0 * (1.0 - 0.25 * advance**2))
+        found = Numerics().sharpening_of(mesh, 1.0, spacing=spacing(mesh))
+        assert found == pytest.approx(2.0 / 3.0 * (1.0 - 0.25 * advance**2))
 
 
 class Tip:
@@ -157,38 +159,117 @@ def test_cantilever_has_the_period_of_bernoulli_and_timoshenko(cells, sharpening
     assert lost <= 0.002 * 1.1  # of the energy: 0.999 of the amplitude are kept a period
 
 
+def spinning(shape, rim, balanced):
+    """A free square or bar about the axis of its middle, its rim at `rim` times c_s, and the time of a turn [s].
+
+    Balanced, it starts with stresses that carry what is centrifugal and leave the faces free, ½ρω² (¼ − x²) along
+    x and the same along y. Else it starts without stress.
+    """
+    omega, dim = rim * SOFT.shear_wave_speed() / 0.5, shape.mesh().dim
+
+    def carried(x, y, *z):
+        rest = (0.0 * x,) * (2 if dim == 2 else 4)
+        return *(0.5 * SOFT.density * omega**2 * (0.25 - (part - 0.5) ** 2) for part in (x, y)), *rest
+
+    scene = Scene(
+        shape=shape,
+        material=SOFT,
+        duration=1.0,
+        velocity=lambda x, y, *z: (-omega * (y - 0.5), omega * (x - 0.5), *(0.0 * part for part in z)),
+        stress=carried if balanced else None,
+    )
+    return Simulation(scene, device="cpu"), 2.0 * np.pi / omega
+
+
+def angular_momentum(simulation):
+    half = simulation.nodes.half.numpy()
+    (x, y), (u, v) = half["x"][:, :2].T, half["v"][:, :2].T
+    return (simulation.nodes.mass.numpy() * (x * v - y * u)).sum()
+
+
+SQUARES = [("lattice", 8, (1.0, 1.0)), ("triangles", 8, (1.0, 1.0))]
+BARS = [("lattice", 4, (1.0, 1.0, 2.0)), ("tetrahedra", 4, (1.0, 1.0, 2.0))]
+
+
+@pytest.mark.parametrize(
+    ("cells", "n", "size", "rim"),
+    [
+        *((*body, 0.05) for body in SQUARES),
+        *(pytest.param(*body, 0.05, marks=pytest.mark.long) for body in BARS),
+        *((*body, 0.5) for body in SQUARES + BARS),
+    ],
+)
+def test_a_free_body_spins_for_twenty_turns(cells, n, size, rim):
+    """Angular momentum to 1e-10, energy to 0.3 %, volume to 0.5 % of what its pressure says.
+
+    Of the bar of jittered hexahedra layers drifted apart in a zigzag, before cells that are bent had a larger κ.
+    """
+    simulation, turn = spinning(jittered(cells, 1.0 / n, size), rim, balanced=True)
+    simulation.step()
+    energy, momentum, tension = simulation.energy(), angular_momentum(simulation), mean_tension(simulation)
+    simulation.run(until=20.0 * turn)
+    now = simulation.energy()
+    assert now.kinetic + now.elastic == pytest.approx(energy.kinetic + energy.elastic, rel=3e-3)
+    assert angular_momentum(simulation) == pytest.approx(momentum, rel=1e-10)
+    bulk = SOFT.young_modulus / (3.0 * (1.0 - 2.0 * SOFT.poisson_ratio))
+    swollen = simulation.mesh.with_nodes(simulation.field("position")).cell_volumes().sum() / np.prod(size)
+    assert swollen == pytest.approx(np.exp((mean_tension(simulation) - tension) / bulk), rel=5e-3)
+
+
+def mean_tension(simulation):
+    weights = simulation.nodes.volume.numpy()
+    return (weights * simulation.field("mean_stress")).sum() / weights.sum()
+
+
 @pytest.mark.parametrize("cells", ["lattice", "triangles"])
-def test_a_body_that_spins_fast_gains_nothing(cells):
-    """Rim speed c_s/2, twenty turns: what the start sets ringing is lost to viscosity, and nothing after that.
+def test_a_body_that_is_set_spinning_loses_what_rings(cells):
+    """Rim speed c_s/2, without the stresses that carry it: 2 % of its energy rings and goes to viscosity, in few
+    turns where a body has so few cells (0.26 / 0.045 / 0.007 % with 8 / 16 / 32 in a turn at 0.2 c_s). After that
+    nothing is lost.
 
     With stresses turned by the whole of a step's turn before they are strained, 0.7 and 1.5 times the energy went
     from the turning into noise and viscosity.
     """
-    omega = 0.5 * SOFT.shear_wave_speed() / 0.5
-    turn = 2.0 * np.pi / omega
+    simulation, turn = spinning(jittered(cells, 0.25), 0.5, balanced=False)
+    simulation.step()
+    start = simulation.energy().kinetic
+    simulation.run(until=5.0 * turn)
+    settled = simulation.energy()
+    assert settled.viscous <= 0.03 * start
+    simulation.run(until=20.0 * turn)
+    now = simulation.energy()
+    assert now.kinetic == pytest.approx(settled.kinetic, rel=3e-3)
+    assert now.viscous - settled.viscous <= 1e-3 * start
+
+
+@pytest.mark.parametrize(("cells", "n"), [("lattice", 5), ("triangles", 5)])
+def test_large_swings_of_a_plate_keep_their_energy(cells, n):
+    """L/H = 10, its tip starts with 0.05 c₀ and swings to 0.53 L: 99 % of the energy are left after each period.
+
+    Only across, as usual, although sections then turn: their start rings, which takes most of it.
+    """
+    length, height, period, b = 0.2, 0.02, 0.255, 1.8751040687 / 0.2
+    plate = Elastic(young_modulus=2e6, poisson_ratio=0.3975, density=1000.0)
+    sound = np.sqrt(plate.young_modulus / (3.0 * (1.0 - 2.0 * plate.poisson_ratio)) / plate.density)
+    ratio = (np.cosh(b * length) + np.cos(b * length)) / (np.sinh(b * length) + np.sin(b * length))
+
+    def across(x):
+        return np.cosh(b * x) - np.cos(b * x) - ratio * (np.sinh(b * x) - np.sin(b * x))
+
     scene = Scene(
-        shape=jittered(cells, 0.25),
-        material=SOFT,
-        duration=1.0,
-        numerics=Numerics(velocity_scheme="cells"),
-        velocity=lambda x, y: (-omega * (y - 0.5), omega * (x - 0.5)),
+        shape=Box((length, height), height / n, cells=cells),
+        material=plate,
+        conditions=[Fixed(edge("left"))],
+        velocity=lambda x, y: (0.0 * x, 0.05 * sound * across(x) / across(length)),
+        duration=2.0 * period,
     )
     simulation = Simulation(scene, device="cpu")
-    mass, nodes = simulation.nodes.mass.numpy()[:, None], simulation.nodes
-
-    def kinetic():
-        return 0.5 * (mass * simulation.field("velocity") ** 2).sum()
-
-    def angular():
-        half = nodes.half.numpy()
-        return (mass * half["x"][:, :1] * half["v"][:, 1:] - mass * half["x"][:, 1:] * half["v"][:, :1]).sum()
-
-    simulation.step()
-    start, spin = kinetic(), angular()
-    simulation.run(until=5.0 * turn)
-    settled, lost = kinetic(), simulation.stepper.rough_loss.numpy().sum()
-    assert lost <= 0.03 * start
-    simulation.run(until=20.0 * turn)
-    assert kinetic() == pytest.approx(settled, rel=3e-3)
-    assert simulation.stepper.rough_loss.numpy().sum() - lost <= 1e-3 * start
-    assert angular() == pytest.approx(spin, rel=1e-10)
+    tip, start, lost = simulation.nearest_node((length, 0.5 * height)), simulation.energy().kinetic, 0.0
+    simulation.run(until=0.25 * period)
+    assert simulation.field("displacement")[tip, 1] == pytest.approx(0.53 * length, rel=0.03)
+    for k in (1, 2):
+        simulation.run(until=k * period)
+        energy = simulation.energy()
+        assert energy.viscous - lost <= 0.01 * start
+        lost = energy.viscous
+    assert energy.kinetic + energy.elastic == pytest.approx(start - lost, rel=1e-3)

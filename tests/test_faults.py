@@ -33,7 +33,7 @@ from warpsph import (
 )
 from warpsph.cli.main import main
 from warpsph.simulation.checkpoint import Checkpoint, Checkpoints, Interval, write_checkpoint
-from warpsph.storage.files import write_whole
+from warpsph.storage.files import remove_parts, write_whole
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1  # of Linux
 NO_RIGHT = 77
@@ -97,6 +97,23 @@ def test_file_is_whole_or_not_there(tmp_path):
     with pytest.raises(OSError, match="No space left"):
         write_whole(path, fails)
     assert path.read_bytes() == b"first" and [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_half_files_go_when_their_writer_does_not_live(tmp_path):
+    """Of one name, or of all; a user's file of nearly such a name stays."""
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    names = [f".{stem}.{process}-0.part.npz" for stem in ("a", "b") for process in (dead.pid, os.getpid())]
+    for name in (*names, ".notes.part.npz", "a.npz"):
+        (tmp_path / name).touch()
+
+    def gone():
+        return [name for name in names if not (tmp_path / name).exists()]
+
+    remove_parts(tmp_path, "a")
+    assert gone() == names[:1]
+    remove_parts(tmp_path)
+    assert gone() == names[::2] and (tmp_path / ".notes.part.npz").exists() and (tmp_path / "a.npz").exists()
 
 
 def test_file_is_on_the_disk_before_it_takes_its_name_and_then_the_name_is(tmp_path, monkeypatch):

@@ -1,7 +1,10 @@
 """The frame store: what it keeps, when, and what is left of it after a run dies or goes on."""
 
+import io
 import json
 import shutil
+import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -33,6 +36,7 @@ from warpsph.export.quantity import quantity
 from warpsph.export.walls import WallMesh, walls_of
 from warpsph.frames import Frames, FrameWriter, evenly
 from warpsph.simulation.history import read_history
+from warpsph.storage.reading import read_arrays
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -254,6 +258,42 @@ def test_history_is_read_up_to_its_last_whole_line(tmp_path):
     np.testing.assert_array_equal(columns["load at top"], [1.5, 2.5])
 
 
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("step [-],load [N]", "does not begin with step and time"),
+        ("step [-],time [s],load", "have no name"),
+        ("step [-],time [s],load [N],load [N]", "one name"),
+        ("step [-],time [s],energy.kinetic [J],energy.elastic [J]", "not those of a balance"),
+        ("step [-],time [s],load [N],force [N]", "not of one length"),
+    ],
+)
+def test_history_with_other_columns_than_are_written_is_refused(header, message, tmp_path):
+    (tmp_path / "history.csv").write_text(f"{header}\n0,0.0,1.5\n")
+    with pytest.raises(DamagedError, match=message):
+        read_history(tmp_path / "history.csv")
+
+
+def test_what_is_quoted_of_a_damaged_file_is_one_line_of_some_length(tmp_path):
+    (tmp_path / "history.csv").write_text(f"step [-],time [s]\n0,{'x' * 5000}\n")
+    with pytest.raises(DamagedError, match="could not convert string to float") as caught:
+        read_history(tmp_path / "history.csv")
+    assert len(str(caught.value)) < 600
+
+
+def test_python_warns_of_nothing_in_a_damaged_file(tmp_path):
+    """NumPy reads an array's form as Python does, which would warn of it on standard error."""
+    array = io.BytesIO()
+    np.save(array, np.zeros(1))
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("values.npy", array.getvalue().replace(b"(1,)", b"1or 1"))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with pytest.raises(DamagedError):
+            read_arrays("frame", tmp_path / "a.npz")
+    assert not said
+
+
 @pytest.fixture(scope="module")
 def framed(tmp_path_factory):
     """The folder of a run with frames."""
@@ -271,6 +311,7 @@ def framed(tmp_path_factory):
         ("000001.npz", "stress", nan, "stress is not finite everywhere"),
         ("000001.npz", "time", lambda v: v - 1.0, "its time is below 0"),
         ("body.npz", "nodes", nan, "nodes is not finite everywhere"),
+        ("body.npz", "nodes", lambda v: 0.0 * v, "a cell has no volume"),
         ("body.npz", "cells", out_of_range, "cells leads out of its table"),
         ("body.npz", "cells", lambda v: v[:, :2].copy(), r"\(2, 2\)"),
         ("body.npz", "faces", out_of_range, "faces leads out of its table"),

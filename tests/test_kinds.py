@@ -9,10 +9,12 @@ from warpsph import Box, Elastic, Numerics, Scene, SceneError, Shape
 from warpsph.device.precision import PRECISIONS
 from warpsph.mesh.kinds import GRID_KINDS, HEXAHEDRON, KINDS, QUAD, SEGMENT, TETRAHEDRON, TRIANGLE
 from warpsph.mesh.mesh import Mesh
+from warpsph.mesh.small_matrices import determinants, least_singular_values
 from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
 from warpsph.state.cells import cell_table
 from warpsph.state.nodes import auxiliary_nodes
+from warpsph.step.cells import spacing
 
 every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
@@ -147,31 +149,6 @@ def test_volumes_are_those_that_faces_enclose(kind):
     assert np.allclose(mesh.cell_volumes(), enclosed, rtol=1e-12)
 
 
-@every_kind
-def test_gradients_of_corners_are_how_volumes_follow_them(kind):
-    """A volume is linear in each coordinate of each corner, so that differences are exact."""
-    mesh = shaken(kind)
-    found = mesh.corner_gradients() * mesh.cell_volumes()[:, None, None]
-    cell, step = len(mesh.cells) // 2, 0.03
-    for corner, axis in itertools.product(range(kind.corners), range(kind.dim)):
-        volumes = []
-        for side in (step, -step):
-            nodes = mesh.nodes.copy()
-            nodes[mesh.cells[cell, corner], axis] += side
-            volumes.append(mesh.with_nodes(nodes).cell_volumes()[cell])
-        slope = (volumes[0] - volumes[1]) / (2.0 * step)
-        assert found[cell, corner, axis] == pytest.approx(slope, abs=1e-12 * 0.25 ** (kind.dim - 1))
-
-
-@every_kind
-def test_gradients_of_corners_are_exact_for_linear_fields_and_hold_each_other(kind):
-    mesh = shaken(kind)
-    gradients = mesh.corner_gradients()
-    assert np.allclose(gradients.sum(axis=1), 0.0, atol=1e-11)
-    ones = np.einsum("mci,mcj->mij", mesh.nodes[mesh.cells], gradients)
-    assert np.allclose(ones, np.eye(kind.dim), atol=1e-11)
-
-
 def test_volumes_by_the_middle_differ_in_warped_hexahedra_only():
     for kind in KINDS.values():
         mesh = shaken(kind)
@@ -191,15 +168,46 @@ def test_stretches_do_not_depend_on_which_corner_is_the_first(kind):
     turns = [kind.mirrored] if kind.grid else list(itertools.permutations(range(kind.corners)))
     for turn in turns:
         other = Mesh(**(vars(shaken(kind)) | {"cells": mesh.cells[:, turn]}))
-        assert np.allclose(other.cell_stretches, mesh.cell_stretches, rtol=1e-10)
+        assert np.allclose(other.least_stretches(), mesh.least_stretches(), rtol=1e-10)
 
 
 def test_least_distance_of_right_triangles():
-    """Legs 1: the map from a regular triangle has singular values √2 and √(2/3); from cell to cell the same."""
+    """Legs 1: the map from a regular triangle has singular values √2 and √(2/3), in every cell."""
     for diagonals in ("rising", "falling", "alternating"):
         mesh = Box((3.0, 2.0), 1.0, cells="triangles", diagonals=diagonals).mesh()
-        assert np.allclose(mesh.cell_stretches, [2.0**0.5, (2.0 / 3.0) ** 0.5])
+        assert np.allclose(mesh.least_stretches(), (2.0 / 3.0) ** 0.5)
         assert mesh.smallest_distance() == pytest.approx((2.0 / 3.0) ** 0.5)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_small_matrices_against_lapack(dim):
+    """Of any kind, of rotations, of those with equal singular values, and of flat ones."""
+    random = np.random.default_rng(dim)
+    matrices = random.normal(size=(300, dim, dim))
+    matrices[:50] = np.linalg.qr(matrices[:50])[0]
+    matrices[50:60] *= np.array([2.0, 2.0, 1e-4])[:dim]
+    matrices[60:70] = np.diag([2.0, 1.0, 1.0][:dim])
+    assert determinants(matrices) == pytest.approx(np.linalg.det(matrices), rel=1e-11)
+    least = np.linalg.svd(matrices, compute_uv=False)[:, -1]
+    assert least_singular_values(matrices) == pytest.approx(least, rel=1e-11)
+
+
+@every_kind
+def test_spacing_of_the_time_step_follows_from_the_gradients_of_every_cell(kind):
+    """2/(√n |∇N|), |·| the largest singular value: the fastest waves a cell knows (`operators/cell_limit.py`)."""
+    mesh = shaken(kind)
+    gradients = np.array(kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
+    largest = [np.linalg.norm(cell, 2) for cell in gradients]
+    assert spacing(mesh) == pytest.approx(2.0 / (np.sqrt(kind.corners) * max(largest)), rel=1e-12)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_one_cell_unlike_the_others_of_a_lattice_is_seen(dim):
+    lattice = Box((1.0,) * dim, 0.25).mesh()
+    assert np.allclose(lattice.least_stretches(), 0.25, rtol=1e-12)
+    nodes = lattice.nodes.copy()
+    nodes[-1, 0] -= 1e-6
+    assert lattice.with_nodes(nodes).smallest_distance() < 0.25 - 1e-7
 
 
 @pytest.mark.parametrize("kind", [TRIANGLE, QUAD], ids=lambda kind: kind.name)

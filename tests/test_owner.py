@@ -118,6 +118,20 @@ def test_user_s_folder_by_the_name_of_ours_stays(arguments, folder):
         assert status == 2 and f"{folder} holds what no " in errors and content(folder) == before
 
 
+def test_only_files_of_our_names_go_with_a_folder_of_ours(tmp_path):
+    """What somebody has put there meanwhile stays, and the folder with it."""
+    ours = re.compile(r"\d{6}\.vtp")
+    owner.mark(tmp_path / "e_frames")
+    for name in ("000000.vtp", ".000001.1-0.part.vtp", "notes.txt", "1.vtp"):
+        (tmp_path / "e_frames" / name).write_text(name)
+    owner.empty(tmp_path / "e_frames", ours)
+    assert {path.name for path in (tmp_path / "e_frames").iterdir()} == {"notes.txt", "1.vtp", MARK}
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "000000.vtp").write_text("mine")
+    owner.empty(tmp_path / "mine", ours)
+    assert content(tmp_path / "mine") == {tmp_path / "mine" / "000000.vtp": b"mine"}, "it has no mark"
+
+
 def test_series_that_a_former_export_wrote_is_replaced_whole():
     pytest.importorskip("vtkmodules", reason="VTK is not installed (extra vtk)")
     assert run("plate.py", "--out", "out", "--frames", "4")[0] == 0

@@ -106,11 +106,8 @@ def test_tensors_are_in_vtk_s_order(run):
 
 @pytest.mark.parametrize("run", [1], indirect=True)
 def test_missing_vtk_is_said_in_one_line(run, monkeypatch, capsys):
-    from warpsph.export import paraview
-
-    paraview._vtk.cache_clear()
+    monkeypatch.delitem(sys.modules, "warpsph.export.paraview", raising=False)
     monkeypatch.setitem(sys.modules, "vtkmodules", None)
     assert main(["export", str(run), str(run / "body.pvd")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (run / "body.pvd").exists()
-    paraview._vtk.cache_clear()

@@ -119,7 +119,7 @@ def test_small_displacements_keep_the_configuration():
         assert simulation.list_builds == (1 if scheme == "taylor" else 0)
         body = simulation.stepper.body
         if scheme == "cells":
-            found = body.nodes.volume.numpy(), simulation.mesh.node_volumes()[0]
+            found = body.nodes.volume.numpy(), simulation.mesh.node_volumes()
         else:
             found = body.auxiliary.volume.numpy(), simulation.mesh.cell_volumes()
         assert found[0] == pytest.approx(found[1], rel=1e-12)

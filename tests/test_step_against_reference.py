@@ -94,7 +94,7 @@ def cells_state_of(simulation):
 
 def model_of(scene):
     nodes, numerics = scene.mesh.nodes, scene.numerics
-    share, volume = scene.mesh.node_volumes()
+    share, volume = scene.mesh.node_volumes(), scene.mesh.node_weights()
     sums = {}
     if numerics.scheme.sums is not None:
         sums = {"h0": numerics.smoothing_ratio * np.sqrt(volume), "kernel": numerics.kernel}

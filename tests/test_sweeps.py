@@ -68,7 +68,7 @@ def probe_kernel(dim, precision, kernel, batch):
     real = PRECISIONS[precision]
     space = Space(CONTINUA[dim], real)
     types, parts = space.types, neighbour_sums(space, KERNELS[kernel], batch)
-    Point, phi, vector, matrix = types.Point, types.phi, types.vector, types.phi_gradient
+    Point, phi, vector, matrix = types.Point, types.phi, types.vector, space.phi.gradient
 
     @wp.kernel(module="unique", enable_backward=False)
     def probe(
@@ -87,12 +87,12 @@ def probe_kernel(dim, precision, kernel, batch):
         values[i] = parts.value(sums)
         gradients[i] = parts.gradient(sums, own[i])
 
-    return probe, types
+    return probe, types, matrix
 
 
 def run_sweep(dim, precision, kernel, x, h, sources, own, base, batch=CPU_BATCH):
     """Value and gradient at points x from source points (position, φ), every pair listed; outputs poisoned."""
-    probe, types = probe_kernel(dim, precision, kernel, batch)
+    probe, types, matrix = probe_kernel(dim, precision, kernel, batch)
     real = PRECISIONS[precision]
     points = np.zeros(len(sources[0]), dtype=types.Point.numpy_dtype())
     points["x"], points["phi"] = sources[0], sources[1]
@@ -100,7 +100,7 @@ def run_sweep(dim, precision, kernel, x, h, sources, own, base, batch=CPU_BATCH)
     pairs.start = wp.array(np.arange(len(x) + 1) * len(points), dtype=wp.int32, device="cpu")
     pairs.index = wp.array(np.tile(np.arange(len(points)), len(x)), dtype=wp.int32, device="cpu")
     values = wp.full(len(x), types.phi(np.nan), dtype=types.phi, device="cpu")
-    gradients = wp.full(len(x), types.phi_gradient(np.nan), dtype=types.phi_gradient, device="cpu")
+    gradients = wp.full(len(x), matrix(np.nan), dtype=matrix, device="cpu")
     inputs = [
         wp.array(x, dtype=types.vector, device="cpu"),
         wp.array(np.full(len(x), h), dtype=real.real, device="cpu"),

@@ -9,6 +9,7 @@ import pytest
 
 from tests.test_restart import slope
 from warpsph import Box, Elastic, Fixed, Scene, SceneError, Simulation, edge
+from warpsph.device.exclusive import exclusive
 from warpsph.simulation.checkpoint import Checkpoint, write_checkpoint
 
 
@@ -80,6 +81,27 @@ def test_forked_simulation_goes_on_with_one_thread_and_is_refused_with_two():
     assert "a forked process has no threads of its parent's" in in_child(lambda: further(two))
     assert np.array_equal(here, further(one)) and np.array_equal(here, further(two))
     assert np.array_equal(in_child(lambda: solved(bar)), solved(bar)), "a new one there"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_fork_while_another_thread_is_at_work_waits_for_nobody():
+    """The thread that had its turn is not in the new process, and would never give it back."""
+    begun, end = threading.Event(), threading.Event()
+
+    @exclusive
+    def work(begun):
+        begun.set()
+        end.wait()
+
+    thread = threading.Thread(target=work, args=(begun,))
+    thread.start()
+    begun.wait()
+    try:
+        assert in_child(lambda: Simulation(bar(), device="cpu").steps) == 0
+    finally:
+        end.set()
+        thread.join()
 
 
 def test_run_on_two_threads_goes_on_from_its_checkpoint_in_another_process(tmp_path, monkeypatch):

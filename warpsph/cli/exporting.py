@@ -10,6 +10,7 @@ from ..export.frames import Frames
 from ..storage.owner import owned_file
 from ..validate import number
 from .keeping import USD, kept_frames, target
+from .stopping import waiting
 
 # Kinds of files, and the module that writes each: they import USD or VTK, which a plain run does not need.
 WRITERS = {".usdc": "usd", ".usda": "usd", ".pvd": "paraview"}
@@ -39,7 +40,8 @@ def add_export(commands) -> None:
 def _export(options: argparse.Namespace) -> int:
     frames = kept_frames(options.dir)
     path = target("FILE", options.file, tuple(WRITERS))
-    writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
+    with waiting():
+        writer = import_module(f"..export.{WRITERS[path.suffix]}", __package__)
     if path.suffix in USD:
         colouring = _colouring(options, frames)
     else:

@@ -12,6 +12,7 @@ from ..errors import SceneError, one_of
 from ..export.frames import Follower, Frames, FrameWriter, evenly
 from ..simulation.simulation import Simulation
 from .settings import Settings
+from .stopping import waiting
 
 Made = TypeVar("Made")
 USD = (".usdc", ".usda")
@@ -24,7 +25,8 @@ def recorders(settings: Settings, folder: Path, end: float) -> list[Callable[[Si
         return []
     followers, times = [], evenly(end, settings.frames)
     if path:
-        from ..export.usd_live import LiveStage, check_clips  # USD is slow to import
+        with waiting():
+            from ..export.usd_live import LiveStage, check_clips  # USD is slow to import
 
         check_clips(path)
         followers.append(lambda frames: Lenient(lambda: LiveStage(frames, path), f"{path} is not written further"))

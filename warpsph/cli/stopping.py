@@ -34,9 +34,33 @@ def handled(handler: Callable[[int, object], None], signals: Sequence[int] = SIG
             signal.signal(each, former)
 
 
+@contextlib.contextmanager
+def _raising(
+    error: Callable[[int], KeyboardInterrupt], signals: Sequence[int], tell: Callable[[], None] = lambda: None
+) -> Iterator[None]:
+    """Signals raise an error meanwhile, after `tell` was called.
+
+    Libraries may make another error of it, as of one that comes while they are imported: that one counts no more.
+    """
+    came: list[int] = []
+
+    def stop(number: int, frame: object) -> None:
+        came.append(number)
+        tell()
+        raise error(number)
+
+    with handled(stop, signals):
+        try:
+            yield
+        except Exception:
+            if came:
+                raise error(came[0]) from None
+            raise
+
+
 def interruptible() -> contextlib.AbstractContextManager[None]:
     """Ctrl-C raises a `KeyboardInterrupt` meanwhile, whatever it does before and afterwards."""
-    return handled(signal.default_int_handler, (signal.SIGINT,))
+    return _raising(lambda number: KeyboardInterrupt(), (signal.SIGINT,))
 
 
 class Interrupt(KeyboardInterrupt):
@@ -55,34 +79,38 @@ def status_of(stop: KeyboardInterrupt) -> int:
     return getattr(stop, "status", 128 + signal.SIGINT)
 
 
-@contextlib.contextmanager
-def interrupting(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
+def interrupting(tell: Callable[[], None] = lambda: None) -> contextlib.AbstractContextManager[None]:
     """Every signal that ends a process raises an `Interrupt` meanwhile, after `tell` was called."""
+    return _raising(Interrupt, SIGNALS, tell)
 
-    def stop(number: int, frame: object) -> None:
-        tell()
-        raise Interrupt(number)
 
-    with handled(stop):
+@contextlib.contextmanager
+def waiting() -> Iterator[None]:
+    """Signals that end a process wait meanwhile.
+
+    So must those that come while a library in C++ is imported: it drops the error, says something of its own, and
+    goes on with half of itself.
+    """
+    came: list[int] = []
+    with handled(lambda number, frame: came.append(number)):
         yield
+    if came:
+        signal.raise_signal(came[0])
 
 
 @contextlib.contextmanager
 def starting_processes() -> Iterator[None]:
-    """Signals that end a process wait meanwhile; processes that are started begin deaf to those of the terminal.
+    """Signals wait meanwhile; processes that are started begin deaf to those of the terminal.
 
     A mask alone would not do: it is one thread's, and any other one may get a signal for it.
     """
-    came: list[int] = []
-    with handled(lambda number, frame: came.append(number)):
+    with waiting():
         former = signal.pthread_sigmask(signal.SIG_BLOCK, TERMINAL) if hasattr(signal, "pthread_sigmask") else ()
         try:
             yield
         finally:
             if hasattr(signal, "pthread_sigmask"):
                 signal.pthread_sigmask(signal.SIG_SETMASK, former)
-    if came:
-        signal.raise_signal(came[0])
 
 
 class Stopper:

@@ -1,6 +1,5 @@
-"""How kernels are compiled, and loading them before they are needed, several at a time."""
+"""How kernels are compiled, and loading them before they are needed."""
 
-import inspect
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
@@ -22,17 +21,17 @@ def forward_kernel(function: Callable) -> wp.Kernel:
 
 
 def load_kernels(kernels: Iterable[wp.Kernel], device: wp.Device) -> None:
-    """Compile the kernels (or fetch them from Warp's cache) side by side, so that no step has to wait for them.
+    """Compile the kernels (or fetch them from Warp's cache), so that no step has to wait for them.
 
-    A cache that has them all need not be writable; where one is missing and can not be stored, another is used.
+    One after the other: each thread that compiles reads Warp's headers first, as long as ten kernels take. A
+    cache that has them all need not be writable; where one is missing and can not be stored, another is used.
     """
     modules = list({kernel.module: None for kernel in kernels})
-    workers = {"max_workers": None} if "max_workers" in inspect.signature(wp.force_load).parameters else {}
     try:
-        wp.force_load(device=device, modules=modules, **workers)
+        wp.force_load(device=device, modules=modules)
     except OSError as error:
         use_temporary_cache(error)
-        wp.force_load(device=device, modules=modules, **workers)
+        wp.force_load(device=device, modules=modules)
 
 
 def use_temporary_cache(error: OSError) -> None:

@@ -108,12 +108,14 @@ def read_body(run: Path, walls: int, tools: int) -> tuple[Mesh, list[np.ndarray]
         require(len(cells) > 0, "it has no cells")
         held = [check_indices(f"wall_{k}", arrays[f"wall_{k}"], len(faces)) for k in range(walls)]
         require(all(wall.ndim == 1 and wall.size for wall in held), "a wall has no faces")
+        mesh = Mesh(**parts | {"spacing": spacing})
+        require(bool((mesh.middle_volumes() > 0.0).all()), "a cell has no volume")
         shapes = [(arrays[f"tool_{k}_points"], arrays[f"tool_{k}_polygons"]) for k in range(tools)]
         for k, (points, polygons) in enumerate(shapes):
             check_array(f"tool_{k}_points", points, shape=(None, 3))
             check_array(f"tool_{k}_polygons", polygons, kind="iu", shape=(None, 4))
             check_indices(f"tool_{k}_polygons", polygons, len(points))
-    return Mesh(**parts | {"spacing": spacing}), held, shapes
+    return mesh, held, shapes
 
 
 def frame_paths(run: Path) -> list[Path]:

@@ -10,7 +10,6 @@ import contextlib
 import errno
 import re
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -23,21 +22,16 @@ from ..storage.owner import empty, holds_only, mark
 from .frames import Frame, Frames
 from .vectors import in_space
 
+try:
+    from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkIOXML
+    from vtkmodules.util import numpy_support
+except ImportError:
+    raise SceneError("FILE", ".pvd", "ParaView files need VTK: pip install vtk") from None
+
 # Stored components in VTK's order of a symmetric tensor.
 TENSOR = {(0, 0): 0, (1, 1): 1, (2, 2): 2, (0, 1): 3, (1, 2): 4, (0, 2): 5}
 FRAME = re.compile(r"\d{6}\.vtp")
 COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
-
-
-@cache
-def _vtk():
-    """The parts of VTK that are needed."""
-    try:
-        from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkIOXML
-        from vtkmodules.util import numpy_support
-    except ImportError:
-        raise SceneError("FILE", ".pvd", "ParaView files need VTK: pip install vtk") from None
-    return vtkCommonCore, vtkCommonDataModel, vtkIOXML, numpy_support
 
 
 def write_series(frames: Frames, path: Path) -> None:
@@ -49,7 +43,6 @@ def write_series(frames: Frames, path: Path) -> None:
     Raises:
         SceneError: a folder `NAME_frames` is there that holds what no export has written.
     """
-    _vtk()
     folder = path.with_name(f"{path.stem}_frames")
     if not holds_only(folder, FRAME):
         raise SceneError("FILE", str(path), f"{folder} holds what no export has written; choose another name")
@@ -79,9 +72,8 @@ def _write_series(frames: Frames, path: Path, folder: Path, fresh: Path) -> None
 
 
 def _body(frame: Frame, fields: tuple[str, ...]):
-    core, model, _, support = _vtk()
-    body, points = model.vtkPolyData(), core.vtkPoints()
-    points.SetData(support.numpy_to_vtk(in_space(frame.field("position")), deep=True))
+    body, points = vtkCommonDataModel.vtkPolyData(), vtkCommonCore.vtkPoints()
+    points.SetData(numpy_support.numpy_to_vtk(in_space(frame.field("position")), deep=True))
     body.SetPoints(points)
     body.SetVerts(_cells(np.arange(len(frame.mesh.nodes))[:, None]))
     if frame.mesh.dim == 1:
@@ -101,21 +93,19 @@ def _polygons(mesh: Mesh) -> np.ndarray:
 
 def _cells(corners: np.ndarray):
     """VTK cells of equal size from the indices of their corners (k, corners)."""
-    _, model, _, support = _vtk()
-    cells, (count, size) = model.vtkCellArray(), corners.shape
+    cells, (count, size) = vtkCommonDataModel.vtkCellArray(), corners.shape
     offsets = np.arange(count + 1, dtype=np.int64) * size
     connectivity = np.ascontiguousarray(corners, dtype=np.int64).ravel()
     cells.SetData(
-        support.numpy_to_vtkIdTypeArray(offsets, deep=True),
-        support.numpy_to_vtkIdTypeArray(connectivity, deep=True),
+        numpy_support.numpy_to_vtkIdTypeArray(offsets, deep=True),
+        numpy_support.numpy_to_vtkIdTypeArray(connectivity, deep=True),
     )
     return cells
 
 
 def _array(name: str, values: np.ndarray, mesh: Mesh):
     """A field (n, …) as a VTK array: vectors with three components, tensors symmetric with six."""
-    support, tensor = _vtk()[3], mesh.continuum.pairs
-    shown, names = np.asarray(values, dtype=np.float32), ()
+    tensor, shown, names = mesh.continuum.pairs, np.asarray(values, dtype=np.float32), ()
     if name in ("stress", "strain"):
         shown, names = np.zeros((len(values), 6), dtype=np.float32), COMPONENTS
         shown[:, [TENSOR[pair] for pair in tensor]] = values
@@ -123,7 +113,7 @@ def _array(name: str, values: np.ndarray, mesh: Mesh):
         shown = in_space(values).astype(np.float32)
     elif values.ndim == 3:
         shown = shown.reshape(len(values), -1)
-    array = support.numpy_to_vtk(np.ascontiguousarray(shown), deep=True)
+    array = numpy_support.numpy_to_vtk(np.ascontiguousarray(shown), deep=True)
     array.SetName(name)
     for k, part in enumerate(names):
         array.SetComponentName(k, part)
@@ -142,7 +132,7 @@ def _silent(part) -> Iterator[None]:
 
 
 def _write(body, path: Path) -> None:
-    writer = _vtk()[2].vtkXMLPolyDataWriter()
+    writer = vtkIOXML.vtkXMLPolyDataWriter()
     with whole(path) as temporary:
         writer.SetFileName(str(temporary))
         writer.SetInputData(body)

@@ -87,15 +87,6 @@ class CellKind:
         others = [np.delete(parts, axis, axis=1).prod(axis=1) for axis in range(self.dim)]
         return self.sides * np.stack(others, axis=1)
 
-    @cached_property
-    def rule(self) -> tuple[tuple[float, np.ndarray], ...]:
-        """Weights and ∂N_k/∂ξ_a, shape (c, d), at points (Gauss) that integrate volumes exactly."""
-        if not self.grid:
-            return ((self.volume, np.array(self.gradients)),)
-        line = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
-        places = tuple(itertools.product(line, repeat=self.dim))
-        return tuple((1.0 / len(places), self.slopes(place)) for place in places)
-
     def shares(self, place: Sequence[float]) -> np.ndarray:
         """N_k at a place ξ of the reference cell, shape (c,): f = Σ_k N_k f_k, and Σ_k N_k = 1."""
         if not self.grid:

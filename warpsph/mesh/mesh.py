@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SceneError, one_of
 from .continuum import CONTINUA, Continuum
 from .kinds import KINDS, CellKind
+from .small_matrices import determinants, least_singular_values
 
 NO_SIDE = -1
 ARRAYS = ("spacing", "nodes", "cells", "faces", "face_cell", "face_side")  # attributes of a mesh, but its tags
@@ -93,44 +94,51 @@ class Mesh:
         return replace(self, nodes=nodes)
 
     def cell_volumes(self) -> np.ndarray:
-        """Volume of each cell [mᵈ], shape (m,), exact: of a hexahedron that between its bilinear faces.
+        """Volume of each cell [mᵈ], shape (m,), exact: of a hexahedron that between its bilinear faces. Read only.
 
         By the Jacobian in the middle; a hexahedron's has the twists h_ab = ∂²x/∂ξ_a∂ξ_b as well, which add
         [det(J₁, h₁₂, h₁₃) + det(h₁₂, J₂, h₂₃) + det(h₁₃, h₂₃, J₃)]/12.
         """
-        volume = self.middle_volumes()
-        if self.dim == 3 and self.kind.grid:
-            jacobians = self.cell_jacobians()
-            twists = dict(zip(self.kind.modes, self._twists(), strict=True))
-            for k in range(3):
-                columns = [jacobians[:, :, a] if a == k else twists[min(a, k), max(a, k)] for a in range(3)]
-                volume += np.sum(columns[0] * np.cross(*columns[1:]), axis=1) / 12.0
-        return volume
+        return self._volumes[0]
 
     def middle_volumes(self) -> np.ndarray:
-        """Volume of each cell [mᵈ] if its Jacobian were everywhere that of its middle, shape (m,).
+        """Volume of each cell [mᵈ] if its Jacobian were everywhere that of its middle, shape (m,). Read only.
 
         It follows a uniform deformation exactly. Only hexahedra with warped faces have another volume.
         """
-        return self.kind.volume * np.linalg.det(self.cell_jacobians())
+        return self._volumes[1]
 
-    def _twists(self) -> list[np.ndarray]:
-        """How the corners of a hexahedron follow its first modes, ∂²x/∂ξ_a∂ξ_b in the middle [m], (m, 3) each."""
-        corners = [self.nodes[corner] for corner in self.cells.T]
-        return [sum(0.5 * s * x for s, x in zip(sign, corners, strict=True)) for sign in self.kind.signs.T]
+    @cached_property
+    def _volumes(self) -> tuple[np.ndarray, np.ndarray]:
+        """`cell_volumes` and `middle_volumes`."""
+        jacobians = self.cell_jacobians()
+        volume = middle = self.kind.volume * determinants(jacobians)
+        if self.dim == 3 and self.kind.grid:
+            twists = self._twists()
+            warped = np.flatnonzero((twists != 0.0).any(axis=(0, 2)))
+            columns, volume = np.moveaxis(jacobians[warped], 2, 0), middle.copy()
+            h = dict(zip(self.kind.modes, twists[:, warped], strict=False))
+            for k in range(3):
+                three = [columns[a] if a == k else h[min(a, k), max(a, k)] for a in range(3)]
+                volume[warped] += determinants(np.stack(three, axis=2)) / 12.0
+        volume.flags.writeable = middle.flags.writeable = False
+        return volume, middle
 
-    def corner_gradients(self) -> np.ndarray:
-        """Mean of ∇N_j over each cell [1/m], shape (m, c, d).
+    def _twists(self) -> np.ndarray:
+        """How the corners of a hexahedron follow its first modes, ∂²x/∂ξ_a∂ξ_b in the middle [m], (3, m, 3)."""
+        return self._corner_sums(0.5 * self.kind.signs[:, :3])
 
-        Times the cell's volume it is ∂V/∂x_j, how its volume follows each corner (Flanagan and Belytschko 1981),
-        exactly for cells of any shape; Σ_j ∇N_j = 0 and Σ_j x_j ∇N_j = 1.
-        """
-        volume, total = 0.0, 0.0
-        for weight, slopes in self.kind.rule:
-            jacobians = self.cell_jacobians(slopes)
-            part = weight * np.linalg.det(jacobians)
-            volume, total = volume + part, total + part[:, None, None] * (slopes @ np.linalg.inv(jacobians))
-        return total / volume[:, None, None]
+    def bent_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cells of a grid that are no parallelepipeds, how far they are bent, b² = Σ (∇ξ_a · x_m)² over the
+        hourglass modes m and their axes a with ξ = ±1 at the corners, and their gradients (k, c, d) [1/m]."""
+        twists = self._corner_sums(self.kind.signs / self.kind.corners)
+        bent = np.flatnonzero((np.abs(twists) > 1e-6 * self.spacing).any(axis=(0, 2)))
+        inverse = np.linalg.inv(self.cell_jacobians()[bent])
+        links = [(m, a) for m, axes in enumerate(self.kind.modes) for a in axes]
+        bends = sum(
+            ((2.0 * inverse[:, a] * twists[m, bent]).sum(axis=1) ** 2 for m, a in links), np.zeros(len(bent))
+        )
+        return bent, bends, np.array(self.kind.gradients) @ inverse
 
     def cell_jacobians(self, slopes: np.ndarray | None = None) -> np.ndarray:
         """∂x/∂ξ at one place of each cell [m], the axes as columns, shape (m, d, d).
@@ -138,9 +146,21 @@ class Mesh:
         Args:
             slopes: ∂N_k/∂ξ_a there, shape (c, d); in the middle unless given.
         """
+        slopes = np.array(self.kind.gradients if slopes is None else slopes, dtype=float)  # float64, always
+        return np.moveaxis(self._corner_sums(slopes), 0, 2)
+
+    def _corner_sums(self, weights: np.ndarray) -> np.ndarray:
+        """Σ_k w_k x_k over the corners of each cell, a sum for each column of weights (c, w), shape (w, m, d)."""
         corners = [self.nodes[corner] for corner in self.cells.T]
-        slopes = np.array(self.kind.gradients if slopes is None else slopes, dtype=float).T  # float64, always
-        return np.stack([sum(g * x for g, x in zip(axis, corners, strict=True)) for axis in slopes], axis=2)
+        return np.array([sum(w * x for w, x in zip(column, corners, strict=True)) for column in weights.T])
+
+    def corner_volumes(self) -> np.ndarray:
+        """det ∂x/∂ξ at the corners of each cell [mᵈ], shape (m, c), of a simplex one for all, (m, 1).
+
+        Where one is not above 0 the cell is flat or folded, although it may have a volume as a whole.
+        """
+        places = self.kind.points if self.kind.grid else self.kind.points[:1]
+        return np.stack([np.linalg.det(self.cell_jacobians(self.kind.slopes(place))) for place in places], axis=1)
 
     @cached_property
     def _inverse_jacobians(self) -> np.ndarray:
@@ -156,9 +176,8 @@ class Mesh:
 
     def at_nodes(self, values: np.ndarray) -> np.ndarray:
         """Mean of cell values (m, k) over the cells around each node, shape (n, k)."""
-        owner, n = self.cells.ravel(), len(self.nodes)
-        sums = [np.bincount(owner, np.repeat(column, self.kind.corners), n) for column in values.T]
-        return np.stack(sums, axis=1) / np.bincount(owner, minlength=n)[:, None]
+        adjacent = np.bincount(self.cells.ravel(), minlength=len(self.nodes))
+        return np.stack([self._over_nodes(column) for column in values.T], axis=1) / adjacent[:, None]
 
     def cells_of_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """Where each node stands in the table of cells, in compressed rows.
@@ -177,41 +196,49 @@ class Mesh:
         squares = [np.sum((corners[:, b] - corners[:, a]) ** 2, axis=0).max() for a, b in self.kind.edges]
         return float(np.sqrt(max(squares)))
 
+    def smallest_distance(self) -> float:
+        """Least distance across a cell [m], which a wave sees: the least of `least_stretches`.
+
+        In a cell that leans it is less than the distance between the middles of opposite faces.
+        """
+        return self._smallest_distance
+
     @cached_property
-    def cell_stretches(self) -> np.ndarray:
-        """Lengths of each cell along its principal axes [m], longest first, shape (m, d).
+    def _smallest_distance(self) -> float:
+        return float(self.least_stretches().min())
+
+    def least_stretches(self) -> np.ndarray:
+        """Least of the lengths of each cell along its principal axes [m], shape (m,).
 
         They are the singular values of the map from a cell with edges of length 1, all alike: from a square or a
         cube, or from a regular triangle or tetrahedron, and so do not depend on which corner is the first.
         """
         jacobians = self.cell_jacobians()
-        if not self.kind.grid:
-            jacobians = jacobians @ np.linalg.inv(self.kind.regular)
-        return np.linalg.svd(jacobians, compute_uv=False)
+        return least_singular_values(jacobians if self.kind.grid else jacobians @ np.linalg.inv(self.kind.regular))
 
-    def smallest_distance(self) -> float:
-        """Least distance across a cell [m], which a wave sees: the least of `cell_stretches`.
+    def node_volumes(self) -> np.ndarray:
+        """Volume of each node [mᵈ], shape (n,): an equal share of each adjacent cell, so that masses add up."""
+        return self._over_nodes(self.cell_volumes()) / self.kind.corners
 
-        In a cell that leans it is less than the distance between the middles of opposite faces.
+    def node_weights(self) -> np.ndarray:
+        """Interpolation weight of each node [mᵈ], shape (n,): the mean of the adjacent cells' `middle_volumes`.
+
+        Edge and corner nodes weigh as much as interior ones; half and quarter weights make free vibrations blow up
+        (METHOD section 2).
         """
-        return float(self.cell_stretches.min())
+        adjacent = np.bincount(self.cells.ravel(), minlength=len(self.nodes))
+        return self._over_nodes(self.middle_volumes()) / adjacent
 
-    def node_volumes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Volumes of the nodes [mᵈ], shape (n,) each: the one that carries mass, and the interpolation weight.
-
-        Mass: an equal share of each adjacent cell, so that masses add up to the body's. Weight: the mean
-        of the adjacent cells' `middle_volumes`, so that edge and corner nodes weigh as much as interior ones; half
-        and quarter weights make free vibrations blow up (METHOD section 2).
-        """
-        owner, n = self.cells.ravel(), len(self.nodes)
-        mass, weight = (
-            np.bincount(owner, np.repeat(volumes, self.kind.corners), n)
-            for volumes in (self.cell_volumes(), self.middle_volumes())
-        )
-        return mass / self.kind.corners, weight / np.bincount(owner, minlength=n)
+    def _over_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Sum of cell values (m,) over the cells around each node, shape (n,)."""
+        return np.bincount(self.cells.ravel(), np.repeat(values, self.kind.corners), len(self.nodes))
 
     def face_normals(self) -> np.ndarray:
-        """Outward unit normal of each boundary face, shape (f, d)."""
+        """Outward unit normal of each boundary face, shape (f, d). Read only."""
+        return self._normals
+
+    @cached_property
+    def _normals(self) -> np.ndarray:
         points = self.nodes[self.faces]
         outward = points.mean(axis=1) - self.nodes[self.cells[self.face_cell]].mean(axis=1)
         if self.dim == 1:
@@ -222,7 +249,9 @@ class Mesh:
         else:
             normals = self._twice_face_areas(points)
         normals = normals * np.sign(np.sum(normals * outward, axis=1, keepdims=True))
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals.flags.writeable = False
+        return normals
 
     def face_areas(self) -> np.ndarray:
         """Area of each boundary face [mᵈ⁻¹], shape (f,): 1 at the ends of a bar."""

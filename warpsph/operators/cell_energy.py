@@ -15,6 +15,7 @@ from ..state.cell_body import (
     ENTRIES,
     FLOW,
     FORCES,
+    REMADE,
     CellBody,
     cell_node_types,
 )
@@ -67,6 +68,7 @@ class CellEnergy:
             flow=booked[FLOW],
             viscous=self._rough.of(self._rough_loss),
             damping=booked[DAMPING],
+            remade=booked[REMADE],
             gravity=booked[FORCES],
             loads=float(self._loads.numpy().sum()),
             walls=booked[CONDITIONS],

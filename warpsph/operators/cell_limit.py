@@ -1,6 +1,7 @@
 """How much sooner than at the start a wave is across a cell of the scheme `cells`, looked at as the body strains.
 
-ω_T² = n c_p² λ_max(Σ_j ∇N_j ⊗ ∇N_j) bounds the frequencies of a cell; of a lattice's it is (2 c_p/Δx)². The
+ω_T² = n c_p² λ_max(Σ_j ∇N_j ⊗ ∇N_j) bounds the frequencies of a cell; of a lattice's it is (2 c_p/Δx)². Bent
+cells have more by n c_p² κ² (1 + b²) Σ_j |∇N_j|², their hourglass modes being held with κ as bending asks for. The
 stiffness and a cell's mass stay what they are: c_p² falls as a cell is pressed, and grows as it is stretched.
 """
 
@@ -14,6 +15,7 @@ from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..state.cell_body import CellBody, cell_node_types
 from ..state.clock import Clock
+from .cell_passes import BENT, BENT_SHARE
 from .cell_shape import cell_shape
 
 
@@ -52,7 +54,7 @@ class CellLimit:
 @cache
 def _rate_kernel(space: Space, kind: CellKind):
     real, shape, CellNodes = space.real, cell_shape(space, kind), cell_node_types(space)[1]
-    T = shape.weights
+    T, bend = shape.weights, shape.bend
 
     @forward_kernel
     def rate(
@@ -67,7 +69,13 @@ def _rate_kernel(space: Space, kind: CellKind):
         for k in range(wp.static(kind.corners)):
             i = corners[c, k]
             x += wp.outer(T[k], nodes.point[i].x)
-        B, volume, _ = shape.measure(x)
-        result[c] = wp.sqrt(space.algebra.largest(shape.spread(B)) / (cell_mass[c] * wp.abs(volume)))
+        B, volume, frame = shape.measure(x)
+        spread = shape.spread(B)
+        largest = space.algebra.largest(spread)
+        if wp.static(shape.partial > 0):
+            b = bend(x, frame)
+            share = real(BENT_SHARE) * wp.min(b / (real(BENT) * real(BENT)), real(1.0))
+            largest += share * share * (real(1.0) + b) * wp.trace(spread)
+        result[c] = wp.sqrt(largest / (cell_mass[c] * wp.abs(volume)))
 
     return rate

@@ -6,7 +6,9 @@ nodal force is its exact adjoint. What L does not see, G_p v − L_i, all the wa
 viscosity, no smooth motion does.
 
 Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening
-of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow.
+of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow. What
+is rough is then met by a stress of 0.3 q of the cell at most: soil cannot carry more of it. Bent cells lose both
+too, and get another κ for it.
 """
 
 from functools import cache
@@ -23,9 +25,15 @@ from ..state.clock import FOLDED
 from .cell_numbers import tensors_of
 from .cell_shape import cell_shape
 
-# Where soil flows κ is FLOWING_SHARE (b/BENT)², at most FLOWING_SHARE, with b = 0 in a parallelogram and 1 where a
-# corner folds: with viscosity alone against it, flow bends a cell further and further until it does.
-FLOWING_SHARE, BENT = 2.0 / 3.0, 0.5
+# As β = (b/BENT)² goes to 1, with b = 0 in a parallelogram and up to 1 where a corner folds, a cell goes over to
+# BENT_SHARE and no sharpening; without that κ is FLOWING_SHARE where soil flows. With viscosity alone against it,
+# flow bends a cell further and further: the free surface beside a footing gets saw-toothed, and cells fold. In
+# elastic bodies layers of a bar of jittered hexahedra, spinning with half of c_s at its rim, drifted to and fro
+# until they folded; sharpened cells with that κ grow.
+FLOWING_SHARE, BENT_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
+# Of q, the most that viscosity adds to the stress of a cell that flows. With 0.1 a clay column folds in the
+# middle; with no such bound one of γH/c_u = 20 is torn (cells made anew).
+ROUGH = 0.3
 
 
 def corner_share(sharpening: float) -> float:
@@ -39,17 +47,19 @@ def corner_share(sharpening: float) -> float:
 
 
 @cache
-def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float):
+def strain_kernel(space: Space, kind: CellKind, flows: bool):
     """Of each cell, at the half step: A/n, e_T, (A/n) G v, and what its hourglass modes add to it."""
     real, types = space.real, space.types
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
-    per_corner, T, (_, put_tensor) = 1.0 / kind.corners, shape.weights, tensors_of(space)
+    per_corner, T, bend, (_, put_tensor) = 1.0 / kind.corners, shape.weights, shape.bend, tensors_of(space)
+    joined, d = shape.joined, space.dim
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers = packed(wp.array2d(dtype=real))
 
     @forward_kernel
     def strain(
         first: int,
+        kappa: real,
         corners: wp.array2d(dtype=wp.int32),
         nodes: CellNodes,
         numbers: wp.array2d(dtype=real),
@@ -74,23 +84,21 @@ def strain_kernel(space: Space, kind: CellKind, flows: bool, corner_share: float
         weighted = real(per_corner) * (wp.transpose(v) * B)  # (A/n) G v
         numbers[c, 0] = share
         elastic = real(1.0) - flowed
-        numbers[c, 1] = elastic
         put_tensor(c, 0, weighted, numbers)
         if wp.static(shape.partial > 0):
-            bent = real(0.0)
-            for q in range(wp.static(len(shape.links))):
-                mode, axis = x[wp.static(shape.links[q][0])], frame[wp.static(shape.links[q][1])]
-                bent = wp.max(bent, wp.abs(wp.dot(mode, axis)) / real(BENT))
-            flowing = real(FLOWING_SHARE) * wp.min(bent * bent, real(1.0))
-            numbers[c, 2] = elastic * real(corner_share) + flowed * flowing
+            bent = wp.min(bend(x, frame) / (real(BENT) * real(BENT)), real(1.0))
+            straight = elastic * kappa + flowed * real(FLOWING_SHARE)
+            numbers[c, 2] = wp.lerp(straight, real(BENT_SHARE), bent)
+            elastic *= real(1.0) - bent
             G = weighted / share
             for p in range(wp.static(shape.partial)):
                 part = types.tensor()
-                for q in range(wp.static(len(shape.links))):
-                    if wp.static(shape.links[q][2] == p):
-                        bend = v[wp.static(shape.links[q][0])] - G * x[wp.static(shape.links[q][0])]
-                        part += wp.outer(bend, frame[wp.static(shape.links[q][1])])
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        part += wp.outer(v[m] - G * x[m], frame[a])
                 put_tensor(c, 1 + p, share * part, numbers)
+        numbers[c, 1] = elastic
 
     return strain
 
@@ -101,10 +109,17 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
     real, types, n = space.real, space.types, kind.corners
     shape, CellNodes = cell_shape(space, kind), cell_node_types(space)[1]
     T, per_corner, size = shape.weights, 1.0 / kind.corners, space.continuum.stress_size
-    sign, (tensor_at, _) = shape.signs, tensors_of(space)
+    sign, joined, bend, (tensor_at, _), d = shape.signs, shape.joined, shape.bend, tensors_of(space), space.dim
     Parts = space.mat(max(1, shape.partial), size)
     packed_nodes, packed_table = packed(CellNodes), packed(wp.array2d(dtype=wp.int32))
     packed_numbers, packed_forces = packed(wp.array2d(dtype=real)), packed(wp.array2d(dtype=types.vector))
+
+    @wp.func
+    def bounded(tau: types.stress, most: real, material: law.Parameters):
+        """τ, or the multiple of it whose size √(2G τ : Dₑ⁻¹ : τ) is the most that may be."""
+        energy = space.stress.complementary(tau, tau, material.lame, material.shear, material.young)
+        size = wp.sqrt(real(2.0) * material.shear * energy)
+        return wp.where(size > most, most / size, real(1.0)) * tau
 
     @forward_kernel
     def force(
@@ -124,7 +139,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
         packed_table(corners)
         packed_numbers(numbers)
         packed_forces(forces)
-        x, dt = shape.Modes(), time_step[0]
+        x, dt, flowed = shape.Modes(), time_step[0], real(0.0)
         mean, mean_rate = types.stress(), types.stress()
         stress_parts, rate_parts = Parts(), Parts()
         for k in range(wp.static(n)):
@@ -134,6 +149,8 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
             sigma = space.phi.stress(point.phi)
             if wp.static(sharp):
                 sigma = nodes.sharpened[i]
+            if wp.static(law.flows):
+                flowed = wp.max(flowed, nodes.flowed[i])
             x += wp.outer(T[k], point.x)
             mean += sigma
             mean_rate += rate
@@ -142,8 +159,11 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                 rate_parts[p] += sign[k, p] * rate
         B, volume, frame = shape.measure(x)
         share = real(per_corner) * volume
-        # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² a bound of the cell's own frequencies, ρ c² its modulus.
-        stiff = real(n) * modulus * wp.trace(shape.spread(B)) / (cell_mass[c] * volume)
+        # η = min(Δt/2, 1/(Δt ω²)), ω² = n c² Σ_j |∇N_j|² (1 + b²) a bound of the cell's own frequencies, ρ c² its
+        # modulus, b how far it is bent: its hourglass modes see linear motion too then.
+        stiff = (
+            real(n) * modulus * wp.trace(shape.spread(B)) * (real(1.0) + bend(x, frame)) / (cell_mass[c] * volume)
+        )
         eta = real(0.0)
         if dt > real(0.0):
             eta = wp.min(real(0.5) * dt, real(1.0) / (dt * stiff))
@@ -151,6 +171,10 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
         G = per_share * tensor_at(c, 0, numbers)
         whole = space.stress.elastic_rate(G, material.lame, material.shear, material.young)
         tau = eta * (whole - real(per_corner) * mean_rate)
+        most = real(0.0)
+        if wp.static(law.flows) and flowed > real(0.0):
+            most = real(ROUGH) * real(per_corner) * space.stress.von_mises(mean) / flowed
+            tau = bounded(tau, most, material)
         S = real(per_corner) * mean + tau
         F = shape.Modes()
         for m in range(wp.static(shape.modes)):
@@ -163,17 +187,20 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                 Y = per_share * tensor_at(c, 1 + p, numbers)
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
+                if wp.static(law.flows) and flowed > real(0.0):
+                    rough = bounded(rough, most, material)
                 W[p] = towards * stress_parts[p] + rough
                 power += share * space.stress.complementary(
                     rough, part, material.lame, material.shear, material.young
                 )
             bent = types.tensor()
-            for q in range(wp.static(len(shape.links))):
-                pull = share * space.stress.traction(
-                    W[wp.static(shape.links[q][2])], frame[wp.static(shape.links[q][1])]
-                )
-                F[wp.static(shape.links[q][0])] += pull
-                bent += wp.outer(pull, x[wp.static(shape.links[q][0])])
+            for p in range(wp.static(shape.partial)):
+                for a in range(wp.static(d)):
+                    m = joined[p, a]
+                    if m >= 0:
+                        pull = share * space.stress.traction(W[p], frame[a])
+                        F[m] += pull
+                        bent += wp.outer(pull, x[m])
             bent = bent / volume
             for m in range(wp.static(shape.modes)):
                 F[m] -= bent * B[m]

@@ -29,22 +29,26 @@ class CellShape:
     Attributes:
         modes: how many there are; the first d are linear, the others hourglass modes.
         partial: how many of them, the first ones, are parts of another one: those that stresses have to know.
-        links: (m, a, p) for each hourglass mode m and each of its axes a: p is m without a.
+        joined: the hourglass mode that mode p and axis a make, −1 where they make none, shape (partial, d). A
+            table, since with `wp.static` of a loop's variable Warp builds a kernel anew to find it in its cache.
         weights: T, shape (c, modes).
         signs: ±1 of each corner in each mode of a grid's cell, shape (c, modes).
         Modes: Warp matrix of the modes of a vector, a row each.
         measure: Modes of x → (B_m in row m, A_T, ∇ξ_a in row a).
         spread: B → A_T² Σ_j ∇N_j ⊗ ∇N_j, of the linear modes.
+        bend: (Modes of x, ∇ξ_a) → b² = Σ (∇ξ_a · x_m)² over hourglass modes and their axes: of a
+            parallelogram 0, as a corner folds between ½ and 1.
     """
 
     modes: int
     partial: int
-    links: tuple[tuple[int, int, int], ...]
+    joined: object
     weights: object
     signs: object
     Modes: type
     measure: wp.Function
     spread: wp.Function
+    bend: wp.Function
 
 
 @cache
@@ -56,20 +60,21 @@ def cell_shape(space: Space, kind: CellKind) -> CellShape:
         weights = np.array([[side[list(m)].prod() for m in axes] for side in kind.sides]) / kind.corners
     else:
         weights = np.array(kind.gradients)
-    links = tuple(
-        (axes.index(m), a, axes.index(tuple(b for b in m if b != a))) for m in axes if len(m) > 1 for a in m
-    )
-    modes = len(axes)
+    modes, partial = len(axes), len(axes) - 1 if kind.modes else 0
+    number = {frozenset(mode): m for m, mode in enumerate(axes)}
+    joined = [number.get(frozenset({a, *p}), -1) if a not in p else -1 for p in axes[:partial] for a in range(d)]
     matrix = space.mat(kind.corners, modes)
+    joined = wp.types.matrix((max(1, partial), d), wp.int32)(*(joined or [-1] * d))
     return CellShape(
         modes=modes,
-        partial=modes - 1 if links else 0,
-        links=links,
+        partial=partial,
+        joined=joined,
         weights=matrix(*weights.ravel().tolist()),
         signs=matrix(*np.sign(weights).ravel().tolist()),
         Modes=space.mat(modes, d),
         measure=_measure(space, kind, axes),
         spread=_spread(space, weights),
+        bend=_bend(space, modes, joined),
     )
 
 
@@ -150,3 +155,20 @@ def _spread(space: Space, weights: np.ndarray) -> wp.Function:
         return wp.transpose(linear) * shared * linear
 
     return spread
+
+
+def _bend(space: Space, modes: int, joined: object) -> wp.Function:
+    real, tensor, d, parts = space.real, space.types.tensor, space.dim, joined._shape_[0]
+
+    @wp.func
+    def bend(x: space.mat(modes, space.dim), frame: tensor):
+        result = real(0.0)
+        for p in range(wp.static(parts)):
+            for a in range(wp.static(d)):
+                m = joined[p, a]
+                if m >= 0:
+                    share = wp.dot(x[m], frame[a])
+                    result += share * share
+        return result
+
+    return bend

@@ -23,6 +23,7 @@ from ..state.cell_body import CellBody
 from ..state.clock import Clock
 from .contact import NEVER, contact_kernel, contact_types
 from .face_shares import FaceShares
+from .outline_shares import OutlineShares
 from .tool_forms import exact_vector, move_kernel, tool_table
 
 SWEEPS = 16  # over several tools, at most: of a corner of 37° they leave a thousandth of what one leaves
@@ -36,6 +37,7 @@ class Tools:
         clock: drives them.
         offset: where their functions of time begin among the clock's.
         held: the table of the conditions.
+        outline: `OutlineArrays` where it changes, or None.
 
     Attributes:
         work: done by the tools on the body [J], a number a node that may meet them.
@@ -46,10 +48,12 @@ class Tools:
         SceneError: a rough tool, and the material's law does not say how strong it is.
     """
 
-    def __init__(self, body: CellBody, clock: Clock, offset: int, held):
+    def __init__(self, body: CellBody, clock: Clock, offset: int, held, outline=None):
         scene, space, device = body.scene, body.space, body.launcher.device
         self._body, self._clock, self._held = body, clock, held
-        nodes = _outer(scene.mesh) if scene.tools else np.zeros(0, dtype=np.int64)
+        nodes = np.zeros(0, dtype=np.int64)
+        if scene.tools:
+            nodes = _outer(scene.mesh) if outline is None else np.arange(len(scene.mesh.nodes))
         rows, count, vector = len(nodes), len(scene.tools), space.types.vector
         self._any, self._table = count > 0, tool_table(scene, space, device, offset)
         self._contacts = contacts = contact_types(space)()
@@ -65,7 +69,9 @@ class Tools:
         self._internals, spare = body.internals, wp.zeros(1, dtype=vector, device=device)
         if self._internals is None:
             self._internals = wp.zeros(1, dtype=space.vec(1), device=device)
-        self._shares = FaceShares(body) if _strong(body) else None
+        self._shares = None
+        if _strong(body):
+            self._shares = FaceShares(body) if outline is None else OutlineShares(body, outline)
         self._areas = spare if self._shares is None else self._shares.vectors
         self.kernels = ()
         if self._any:

@@ -17,7 +17,7 @@ class NodeTypes:
         size: length of φ = (v, σ), d + s.
         vector, stress, phi: Warp vectors of length d, s and d + s.
         tensor: d × d matrix.
-        phi_gradient, stress_gradient: (d + s) × d matrix ∂φ_k/∂x_l, s × d matrix ∂σ_k/∂x_l.
+        stress_gradient: s × d matrix ∂σ_k/∂x_l.
         Point: what a neighbour is asked for, packed since one gather is cheaper than two: position x [m] and
             unknowns φ = (v [m/s], σ [Pa]). 8 values in the plane and 12 in space suit wide loads; with the volume
             in it they would not.
@@ -29,7 +29,6 @@ class NodeTypes:
     stress: type
     phi: type
     tensor: type
-    phi_gradient: type
     stress_gradient: type
     Point: type
     MaterialNodes: type
@@ -73,7 +72,6 @@ def node_types(continuum: Continuum, precision: Precision) -> NodeTypes:
         stress=precision.vec(s),
         phi=precision.vec(d + s),
         tensor=tensor,
-        phi_gradient=precision.mat(d + s, d),
         stress_gradient=precision.mat(s, d),
         Point=Point,
         MaterialNodes=MaterialNodes,

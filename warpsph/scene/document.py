@@ -25,6 +25,7 @@ from .load import Load
 from .numerics import Numerics
 from .output import EdgeForce, NodeValue, Output, Probe, Reaction, ToolForce, ToolImpulse, ToolTorque
 from .registry import MATERIALS
+from .remade import Remade
 from .scene import BodyForce, Scene
 from .selection import Selection, chosen, edge, where
 from .shape import Mapped, Placed, Shape
@@ -36,6 +37,7 @@ TABLES = ("tags",)  # fields that hold a table of values by names of the user's
 # Fields that hold one class only need no `type`.
 PLAIN = {
     "body_force": BodyForce,
+    "cells": Remade,
     "free_surface": FreeSurface,
     "numerics": Numerics,
     "output": Output,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
-from ..mesh.continuum import Continuum
 from ..mesh.mesh import Mesh
 from ..validate import choice, number
 from .registry import KERNELS
@@ -88,11 +87,11 @@ class Numerics:
         """The scheme that `velocity_scheme` names."""
         return scheme_of(self.velocity_scheme)
 
-    def sharpening_of(self, mesh: Mesh, wave_speed: float) -> float:
-        """c of `cells` for a body whose fastest waves have that speed [m/s]."""
+    def sharpening_of(self, mesh: Mesh, wave_speed: float, *, spacing: float) -> float:
+        """c of `cells` for waves of that speed [m/s], with Δx of the Courant number as it is in the body [m]."""
         if self.sharpening is not None:
             return self.sharpening
-        advance = self.courant * self.scheme.spacing(mesh)  # c_p Δt
+        advance = self.courant * spacing  # c_p Δt
         if self.time_step is not None:
             advance = wave_speed * self.time_step
         size = (np.mean(mesh.cell_volumes()) / mesh.kind.volume) ** (1.0 / mesh.dim)  # of a lattice Δx, as mapped
@@ -103,20 +102,14 @@ class Numerics:
         """Radius of the support over spacing [-], of a scheme with sums over neighbours."""
         return self.smoothing.support * self.smoothing_ratio
 
-    def check_support(self, continuum: Continuum, stretch: float = 1.0) -> None:
-        """Refuse a support that is too small (or absurdly large) for the lattice; cells have none.
-
-        Args:
-            continuum: the continuum, for its number of dimensions.
-            stretch: longest cell edge over spacing, 1 on a regular lattice.
-        """
+    def check_support(self, mesh: Mesh) -> None:
+        """Refuse a support that is too small for the longest cell edge, or far too large; cells have none."""
         if self.scheme.sums is None:
             return
-        support = self.smoothing.support
-        least = continuum.smallest_support * stretch / support
-        most = self.scheme.sums.largest_support / support
+        support, continuum = self.smoothing.support, mesh.continuum
+        reach = continuum.smallest_support * mesh.largest_edge() / mesh.spacing
+        least, most = reach / support, self.scheme.sums.largest_support / support
         if not least < self.smoothing_ratio <= most:
-            reach = continuum.smallest_support * stretch
             raise SceneError(
                 "smoothing_ratio",
                 self.smoothing_ratio,

@@ -171,9 +171,9 @@ Signature = tuple[tuple[int, tuple[tuple[float, ...], ...]], ...]
 
 def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list[int]]:
     """Constrained nodes grouped by which conditions hold there and with which normals."""
-    touching: dict[int, list[int]] = defaultdict(list)  # places in the table of faces
-    for place, node in enumerate(mesh.faces.ravel().tolist()):
-        touching[node].append(place)
+    places = np.argsort(mesh.faces.ravel(), kind="stable")  # in the table of faces, node by node
+    first = np.searchsorted(mesh.faces.ravel()[places], np.arange(len(mesh.nodes) + 1)).tolist()
+    places = places.tolist()
     corners, angles, face_normals = mesh.faces.shape[1], mesh.face_angles().round(9).ravel(), mesh.face_normals()
     normals_at = np.repeat(face_normals, corners, axis=0)
     alike = np.repeat(np.unique(face_normals, axis=0, return_inverse=True)[1].ravel(), corners)
@@ -192,15 +192,18 @@ def _groups(mesh: Mesh, conditions: Sequence[Condition]) -> dict[Signature, list
             raise SceneError(f"conditions[{index}]", condition, "its selection must hold at least one node")
         covered.append(condition.faces(mesh))
         given = getattr(condition, "normal", None)
+        everywhere = () if condition.rigid else None if given is None else (given,)  # rigid: however faces look
         own = np.repeat(faces, corners)
-        edge = np.repeat(unmoved, corners).tolist() if condition.unmoved else own.tolist()
+        edge = (np.repeat(unmoved, corners) if condition.unmoved else own).tolist()
         known: dict[tuple, tuple] = {}  # most nodes have faces around them like those of some other node
         for node in np.flatnonzero(condition.nodes(mesh)).tolist():
-            around = [place for place in touching.get(node, ()) if edge[place]]
-            key = tuple((alike[place], bool(own[place])) for place in around)
-            if given is None and key not in known:
-                known[key] = _smooth_normals(normals_at[around], angles[around], own[around])
-            normals = known[key] if given is None else (given,)
+            normals = everywhere
+            if normals is None:
+                around = [place for place in places[first[node] : first[node + 1]] if edge[place]]
+                key = tuple((alike[place], bool(own[place])) for place in around)
+                if key not in known:
+                    known[key] = _smooth_normals(normals_at[around], angles[around], own[around])
+                normals = known[key]
             if not normals and condition.takes_normal:
                 raise SceneError(
                     f"conditions[{index}]",

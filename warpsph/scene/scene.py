@@ -29,6 +29,7 @@ from .load import Load
 from .material import Material
 from .numerics import Numerics
 from .output import Output
+from .remade import Remade
 from .resolve import BoundaryTable, resolve
 from .shape import Shape
 from .thickness import check_thickness
@@ -79,6 +80,7 @@ class Scene:
             (bar s11; plane strain s11, s22, s12, s33; solid s11, s22, s33, s12, s13, s23); zero unless given.
         large_displacements: whether nodes move and stresses turn with them (updated Lagrangian); if not, the
             initial configuration is kept (small strains).
+        cells: cells that are made anew as the body flows, `Remade()`, or None.
         numerics: choices of the discretisation.
         output: what to record.
         name: a short name, for messages and results.
@@ -109,6 +111,7 @@ class Scene:
     velocity: Callable | None = None
     stress: Callable | None = None
     large_displacements: bool = True
+    cells: Remade | None = None
     numerics: Numerics = field(default_factory=Numerics)
     output: Output = field(default_factory=Output)
     name: str = "scene"
@@ -135,9 +138,11 @@ class Scene:
         if self.free_surface is not None:
             self._check_free_surface()
         self.numerics.scheme.check_cells(self.mesh)
-        self.numerics.check_support(self.mesh.continuum, self.mesh.largest_edge() / self.mesh.spacing)
+        self.numerics.check_support(self.mesh)
         self._check_loads()
         self._check_tools()
+        if self.cells is not None:
+            instance("cells", self.cells, Remade, "Remade(…) or None").check(self)
         self.output.check(self)
         check_thickness(self.mesh, self.boundary, self._freed_nodes())
         _ = self.initial_velocity, self.initial_stress, self.initial_internals
@@ -219,6 +224,17 @@ class Scene:
     def mesh(self) -> Mesh:
         """The initial nodes, cells and faces."""
         return self.shape.mesh()
+
+    @cached_property
+    def wave_spacing(self) -> float:
+        """Δx in the Courant number [m], the scheme's."""
+        return self.numerics.scheme.spacing(self.mesh)
+
+    @cached_property
+    def sharpening(self) -> float:
+        """c of the scheme `cells` [-], see `Numerics.sharpening`."""
+        numerics, mesh = self.numerics, self.mesh
+        return numerics.sharpening_of(mesh, self.material.wave_speed(mesh.dim), spacing=self.wave_spacing)
 
     @cached_property
     def boundary(self) -> BoundaryTable:

@@ -276,8 +276,8 @@ class Placed(Shape):
 
 
 def _unfolded(mesh: Mesh, field: str, value: object) -> Mesh:
-    if mesh.cell_volumes().min() <= 0.0:
-        raise SceneError(field, value, "it must keep every cell's volume positive (no folds)")
+    if mesh.corner_volumes().min() <= 0.0:
+        raise SceneError(field, value, "it must keep every cell's volume positive, at each corner (no folds)")
     place = overlap(mesh)
     if place is not None:
         at = ", ".join(f"{x:.4g}" for x in place)

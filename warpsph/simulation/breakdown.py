@@ -45,7 +45,7 @@ def _folded(simulation, dt: float) -> tuple[str, int, str]:
     boxes = np.linalg.norm(jacobians, axis=1).prod(axis=1)
     cell = int(np.argmin(np.linalg.det(jacobians) / boxes))
     advice = "since a folded cell has no inside; material that is sheared by several cells needs larger ones"
-    return f"cell {cell} folded, nodes {', '.join(map(str, mesh.cells[cell]))},", int(mesh.cells[cell, 0]), advice
+    return f"cell {cell} folded, nodes {_nodes(mesh, cell)},", int(mesh.cells[cell, 0]), advice
 
 
 def _too_fast(simulation, dt: float) -> tuple[str, int, str]:
@@ -69,11 +69,22 @@ def _flattened(simulation, dt: float) -> tuple[str, int, str]:
 
 def _unaccounted(simulation, dt: float) -> tuple[str, int, str]:
     balance, unit = simulation.energy(), UNITS[simulation.mesh.dim]
-    speeds = (simulation.field("velocity") ** 2).sum(axis=1)
-    share = 100.0 * abs(balance.amiss) / simulation.largest_energy
+    largest = max(simulation.largest_energy, balance.largest)
     did = "came from nowhere" if balance.amiss > 0.0 else "vanished"
-    what = f"{abs(balance.amiss):.3g} {unit} of energy {did}, {share:.3g} % of the largest in the balance,"
+    what = f"{abs(balance.amiss):.3g} {unit} of energy {did}, {100.0 * abs(balance.amiss) / largest:.3g} %"
+    what = f"{what} of the largest in the balance,"
+    mesh = simulation.mesh.with_nodes(simulation.field("position"))
+    smallest = mesh.corner_volumes().min(axis=1)
+    if smallest.min() <= 0.0:
+        cell = int(np.argmin(smallest / mesh.cell_volumes()))
+        advice = f"since corners folded, above all of cell {cell}, nodes {_nodes(mesh, cell)}"
+        return what, int(mesh.cells[cell, 0]), advice
+    speeds = (simulation.field("velocity") ** 2).sum(axis=1)
     return what, int(np.argmax(speeds)), "since it is unstable (at the fastest node), or its time step is too long"
+
+
+def _nodes(mesh, cell: int) -> str:
+    return ", ".join(map(str, mesh.cells[cell]))
 
 
 _SEEN: dict[str, tuple[type[BreakdownError], Callable]] = {

@@ -98,7 +98,7 @@ FIELDS: dict[str, Field] = {
         "kg",
         "(n,)",
         "mass of the node (per metre of thickness in plane strain, per square metre of section in a bar)",
-        lambda s: s.scene.material.density * s.mesh.node_volumes()[0],
+        lambda s: s.scene.material.density * s.mesh.node_volumes(),
     ),
 }
 

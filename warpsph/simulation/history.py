@@ -8,6 +8,7 @@ import hashlib
 import io
 import math
 import os
+import re
 import sys
 from array import array
 from collections.abc import Iterable, Mapping
@@ -197,10 +198,14 @@ def read_history(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         text = path.read_bytes().decode("utf-8")
         whole_lines = text[: text.rfind("\n") + 1]
         header, *rows = list(csv.reader(io.StringIO(whole_lines, newline=""), strict=True)) or [[]]
-        require(header[:2] == ["step [-]", "time [s]"], "it does not begin with step and time")
+        named = [re.fullmatch(r"(.+) \[(.*)\]", cell, re.DOTALL) for cell in header]
+        require(all(named), "its columns have no name [unit]")
+        units = dict(column.groups() for column in named)
+        require([*units][:2] == ["step", "time"], "it does not begin with step and time")
+        require(len(units) == len(header), "two of its columns have one name")
+        energies = [name.removeprefix(ENERGY_COLUMN) for name in units if name.startswith(ENERGY_COLUMN)]
+        require(energies in ([], list(COLUMNS)), "its energies are not those of a balance")
         require(all(len(row) == len(header) for row in rows), "its rows are not of one length")
         table = np.array(rows, dtype=float).reshape(-1, len(header))
         require(bool(np.isfinite(table[:, :2]).all()), "its times are not finite")
-    names = [cell.rsplit(" [", 1)[0] for cell in header]
-    units = [cell.rsplit(" [", 1)[-1].rstrip("]") for cell in header]
-    return dict(zip(names, table.T, strict=True)), dict(zip(names, units, strict=True))
+    return dict(zip(units, table.T, strict=True)), units

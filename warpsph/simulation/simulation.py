@@ -135,7 +135,7 @@ class Simulation:
         stretch = self._time_step.begin(self.time, end, self.steps)
         while self.steps < stretch.last:
             with held_back():
-                self._advance(self._starts(stretch, observers), stretch.time_step)
+                self._advance(self._starts(stretch, observers), stretch.time_step, stretch.last)
                 self.time = stretch.time_after(self.steps)
                 stretch = self._time_step.keep_below_limit(self.time, self.steps)
             for observer in observers:
@@ -151,7 +151,7 @@ class Simulation:
         return times[: next((k for k in range(1, most) if times[k] >= due), most)]
 
     @exclusive
-    def _advance(self, times: list[float], dt: float) -> None:
+    def _advance(self, times: list[float], dt: float, last: int | None = None) -> None:
         begin = clock.perf_counter()
         outcome = self.stepper.advance(times, dt)
         self.steps += outcome.made
@@ -160,17 +160,20 @@ class Simulation:
         self.longest_step = max(self.longest_step, dt)
         self.wall_time += clock.perf_counter() - begin
         flattened = FLATTENED if self.stepper.shrinkage < LEAST_STEP_SHARE else None
-        fault = outcome.fault or flattened or self._watch_energy()
+        fault = outcome.fault or flattened or self._watch_energy(self.steps == last)
         if fault is not None:
             raise breakdown(self, fault, dt)
 
-    def _watch_energy(self) -> str | None:
-        """At some steps, whoever observes: whether energy has come from nowhere, or gone."""
-        balance = self.stepper.energy() if self.steps % WATCH == 0 else None
+    def _watch_energy(self, last: bool) -> str | None:
+        """At some steps, whoever observes, and at the last: whether energy has come from nowhere, or gone."""
+        regular = self.steps % WATCH == 0
+        balance = self.stepper.energy() if regular or last else None
         if balance is None:
             return None
-        self.largest_energy = max(self.largest_energy, balance.largest)
-        return UNACCOUNTED if abs(balance.amiss) > MOST_UNACCOUNTED * self.largest_energy else None
+        largest = max(self.largest_energy, balance.largest)
+        if regular:  # what goes on is as if it had not ended there
+            self.largest_energy = largest
+        return UNACCOUNTED if abs(balance.amiss) > MOST_UNACCOUNTED * largest else None
 
     @exclusive
     def energy(self) -> Energy | None:

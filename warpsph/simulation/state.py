@@ -16,10 +16,11 @@ import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
+from ..remaking.triangulation import Triangulation
 from ..storage.reading import check_indices, require
 
 PACKAGE = __package__.partition(".")[0]
-COUNTS = ("builds",)  # whole numbers that a run changes
+COUNTS = ("builds", "made", "refused")  # whole numbers that a run changes
 
 
 class Slot(NamedTuple):
@@ -173,9 +174,10 @@ def slots(root: object) -> Iterator[Slot]:
 def _is_part(value: object) -> bool:
     """Whether it is an object of this package with attributes, structs of arrays included.
 
-    No types and no scene; nor what launches kernels, which belongs to the process and not to the state.
+    No types and no scene; nor what launches kernels, which belongs to the process and not to the state, nor a
+    triangulation, which is taken from the cells there are.
     """
-    if isinstance(value, type | Launcher) or not hasattr(value, "__dict__"):
+    if isinstance(value, type | Launcher | Triangulation) or not hasattr(value, "__dict__"):
         return False
     modules = [kind.__module__ for kind in type(value).__mro__]
     return any(m.partition(".")[0] == PACKAGE and not m.startswith(f"{PACKAGE}.scene") for m in modules)

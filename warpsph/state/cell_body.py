@@ -1,20 +1,21 @@
 """A body of the scheme `cells` on a device: its nodes, and what a pass over the cells leaves of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
+from ..mesh.mesh import Mesh
 from ..physics.space import Space
 from ..scene.scene import Scene
 from .body import Body, shared_parts
-from .cells import NodeCells, cell_table, has_slots, node_cells
+from .cells import NodeCells, cell_table, has_slots, node_cells, with_room
 
 # Rows of the nodes' books, energies [J]: work of the body force and of conditions on velocities; what damping,
-# elastic strain and flow took.
-ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW = tuple(range(5))
+# elastic strain, flow and cells that were made anew took.
+ENTRIES = FORCES, CONDITIONS, DAMPING, ELASTIC, FLOW, REMADE = tuple(range(6))
 LEAST_VOLUME = 0.15  # of a node's initial volume: one that loses its surroundings gets softer, not singular
 
 
@@ -65,7 +66,8 @@ class CellBody(Body):
             `strained` ∫ |d| dt since the step was last measured; `sharpened` K σ [Pa], where it is asked for;
             `flowed` of a law that flows, 1 in a step in which it does, then less and less.
         corners: node indices of each cell, shape (m, c).
-        cell_mass: mass of each cell [kg], constant, shape (m,).
+        cell_mass: mass of each cell [kg], constant, shape (m,). Where cells are made anew there is room for 2n;
+            those that are none have no mass, and the corners of another.
         slots: whether `node_cells` has them.
         node_cells: the cells around each node.
         straining: those that a node's volume and strain rate are of: `node_cells` without cells that conditions
@@ -87,7 +89,7 @@ class CellBody(Body):
         point = np.zeros(n, dtype=types.Point.numpy_dtype())
         point["x"] = x
         point["phi"] = np.concatenate([scene.initial_velocity, scene.initial_stress], axis=1)
-        volume, _ = mesh.node_volumes()
+        volume = mesh.node_volumes()
         nodes.point = wp.array(point, dtype=types.Point, device=device)
         nodes.reference = wp.array(x, dtype=types.vector, device=device)
         nodes.mass = wp.array(scene.material.density * volume, dtype=space.real, device=device)
@@ -102,26 +104,41 @@ class CellBody(Body):
         }.items():
             setattr(nodes, name, wp.zeros(n, dtype=dtype, device=device))
         nodes.books = wp.zeros((len(ENTRIES), n), dtype=wp.float64, device=device)
-        shared, slots = shared_parts(scene, space, launcher), has_slots(mesh)
+        shared, slots = shared_parts(scene, space, launcher), has_slots(mesh) and scene.cells is None
         nodes.sharpened = wp.zeros(n if sharp else 1, dtype=types.stress, device=device)
         nodes.flowed = wp.zeros(n if shared["law"].flows else 1, dtype=space.real, device=device)
         table, rigid = node_cells(mesh, slots, device), scene.rigid_cells
+        corners = cell_table(mesh, mesh.kind, device)
+        cell_mass = scene.material.density * mesh.cell_volumes()
+        if scene.cells is not None:
+            corners, cell_mass = (
+                with_room(corners, table, n),
+                np.append(cell_mass, np.zeros(2 * n - len(cell_mass))),
+            )
         return CellBody(
             nodes=nodes,
-            corners=cell_table(mesh, mesh.kind, device),
-            cell_mass=wp.array(scene.material.density * mesh.cell_volumes(), dtype=space.real, device=device),
+            corners=corners,
+            cell_mass=wp.array(cell_mass, dtype=space.real, device=device),
             slots=slots,
             node_cells=table,
             straining=node_cells(mesh, slots, device, without=rigid) if rigid.any() else table,
             **shared,
         )
 
+    def mesh(self) -> Mesh:
+        """The nodes at the start, and the cells as they are now; of those made anew without the boundary."""
+        mesh = self.scene.mesh
+        if self.scene.cells is None:
+            return mesh
+        cells = self.corners.numpy()[self.cell_mass.numpy() > 0.0]
+        return replace(mesh, cells=cells)
+
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,): m over the volume of their cells as they are now."""
-        mesh = self.scene.mesh
+        mesh = self.mesh()
         if self.scene.large_displacements:
             mesh = mesh.with_nodes(mesh.nodes + self.nodes.displacement.numpy())
-        return self.nodes.mass.numpy() / mesh.node_volumes()[0]
+        return self.nodes.mass.numpy() / mesh.node_volumes()
 
     def stress(self) -> np.ndarray:
         """The stress that forces come from [Pa], sharpened if any is, stored components, shape (n, s)."""

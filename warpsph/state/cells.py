@@ -66,6 +66,16 @@ def node_cells(mesh: Mesh, slots: bool, device: wp.Device, without: np.ndarray |
     return table
 
 
+def with_room(corners: wp.array, table: NodeCells, nodes: int) -> wp.array:
+    """The corners of triangles with room for as many as the nodes can have; so is the table, from now on."""
+    corners = corners.numpy()
+    room = np.concatenate([corners, np.repeat(corners[:1], 2 * nodes - len(corners), axis=0)])
+    last = np.full(room.size - corners.size, room.size - 1, dtype=np.int32)
+    table.place = wp.array(np.append(table.place.numpy(), last), dtype=wp.int32, device=table.place.device)
+    table.first = wp.array(np.append(table.first.numpy(), room.size), dtype=wp.int32, device=table.place.device)
+    return wp.array(room, dtype=wp.int32, device=table.place.device)
+
+
 @cache
 def cell_in_slot(kind: CellKind) -> wp.Function:
     """(node, corner, NodeCells with slots) → the cell whose corner the node is, or −1."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 UNITS = {1: "J/m²", 2: "J/m", 3: "J"}  # of a bar for its section, of plane strain for its thickness
 
-TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping")  # where it is, or went
-LOSSES = TAKEN[2:]
+TAKEN = ("kinetic", "elastic", "flow", "viscous", "damping", "remade")  # where it is, or went
+LOSSES = TAKEN[2:5]
 GIVEN = ("gravity", "loads", "walls", "tools")  # where it came from
 COLUMNS = (*TAKEN, *GIVEN, "unaccounted")
 
@@ -22,6 +22,7 @@ class Energy:
         flow: taken by the material's flow.
         viscous: taken by the viscosity of the scheme.
         damping: taken by the scene's damping.
+        remade: taken by cells that were made anew.
         gravity: work of the body force on the body.
         loads: work of tractions on the body.
         walls: work of the conditions on velocities on the body.
@@ -34,6 +35,7 @@ class Energy:
     flow: float
     viscous: float
     damping: float
+    remade: float
     gravity: float
     loads: float
     walls: float

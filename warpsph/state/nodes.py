@@ -50,7 +50,7 @@ def material_nodes(scene: Scene, space: Space, device: wp.Device):
     """
     mesh, density, types = scene.mesh, scene.material.density, space.types
     n = len(mesh.nodes)
-    _, volume = mesh.node_volumes()
+    volume = mesh.node_weights()
     point = np.zeros(n, dtype=types.Point.numpy_dtype())
     point["x"] = mesh.nodes - mesh.middle
     point["phi"] = np.concatenate([scene.initial_velocity, scene.initial_stress], axis=1)

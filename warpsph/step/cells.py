@@ -14,11 +14,13 @@ from ..mesh.mesh import Mesh
 from ..operators.cell_energy import CellEnergy
 from ..operators.cell_limit import CellLimit
 from ..operators.cell_numbers import numbers_of
-from ..operators.cell_passes import corner_share, force_kernel, strain_kernel
+from ..operators.cell_passes import BENT, BENT_SHARE, corner_share, force_kernel, strain_kernel
 from ..operators.cell_shape import cell_shape
 from ..operators.face_loads import LoadedFaces
 from ..operators.held import held_table
+from ..operators.node_limit import NodeLimit
 from ..operators.node_passes import kick_kernel, push_kernel, rate_kernel, stress_kernel
+from ..operators.remaking import Remaking
 from ..operators.sharpening import Sharpening
 from ..operators.tools import Tools
 from ..physics.space import Space
@@ -43,6 +45,7 @@ class CellStepper(Stepper):
         conditions: the table of the conditions.
         reactions: what the conditions take up at each constrained node, R [N] with m dv/dt = f + R, shape (b,).
         loads: forces on boundary faces, and their work.
+        remaking: makes cells anew.
         tools: the tools, what they do to the body, and their work.
         rough_loss: energy lost to the rough viscosity [J], a number a cell.
     """
@@ -52,9 +55,9 @@ class CellStepper(Stepper):
         clock = Clock(
             scene.body_force, (*driven, *scene.loads.functions, *scene.tool_functions[0]), space, launcher
         )
-        c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
+        c = scene.sharpening
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
-        device, real, cells = launcher.device, space.real, len(scene.mesh.cells)
+        device, real, cells = launcher.device, space.real, body.corners.shape[0]
         n, moves = len(scene.mesh.nodes), scene.large_displacements
         self.conditions = held_table(scene.boundary, n, space=space, device=device, clock=clock)
         self._numbers = wp.zeros(
@@ -65,20 +68,21 @@ class CellStepper(Stepper):
         self.rough_loss = wp.zeros(cells, dtype=wp.float64, device=device)
         self.loads = LoadedFaces(body, clock, len(driven))
         offset = len(driven) + len(scene.loads.functions)
-        self.tools = Tools(body, clock, offset, self.conditions)
-        self._limit = CellLimit(body, clock)
+        self._limit = (CellLimit if scene.cells is None else NodeLimit)(body, clock)
+        self.remaking = remaking = Remaking(body, clock, self._limit)
+        self.tools = Tools(body, clock, offset, self.conditions, remaking.outline)
         self._energy = CellEnergy(body, rough_loss=self.rough_loss, loads=self.loads.work, tools=self.tools.work)
-        kind, slots, share = body.kind, body.slots, corner_share(c)
+        kind, slots, self._kappa = body.kind, body.slots, corner_share(c)
         self._sharpening = sharpening = Sharpening(body, c, self._numbers)
         self._kick = kick_kernel(space, moves)
-        self._strain = strain_kernel(space, kind, body.law.flows, share)
+        self._strain = strain_kernel(space, kind, body.law.flows)
         self._rate = rate_kernel(space, kind, slots)
         self._stress = stress_kernel(space, kind, body.law, slots=slots, moves=moves, sharp=sharpening.on)
         self._force = force_kernel(space, kind, body.law, sharpening.on)
         self._push = push_kernel(space, kind, slots)
         kernels = [self._kick, self._strain, self._rate, self._stress, self._force, self._push]
-        super().__init__(launcher, clock, parts=(self._limit,))
-        for part in (clock, sharpening, self.loads, self.tools, self._limit, self._energy):
+        super().__init__(launcher, clock, parts=(self._limit, remaking) if remaking.on else (self._limit,))
+        for part in (clock, sharpening, self.loads, self.tools, remaking, self._limit, self._energy):
             kernels += part.kernels
         load_kernels(kernels, device)
         self._limit.refresh()
@@ -123,6 +127,7 @@ class CellStepper(Stepper):
         inputs = [self.conditions, clock.forces, damping, dt, body.node_cells, self._forces]
         launch(self._push, points, [*inputs, nodes, self.reactions, faults])
         self.tools.settle()
+        self.remaking.count()
         clock.tick()
 
     def _rates(self) -> None:
@@ -132,22 +137,33 @@ class CellStepper(Stepper):
         inputs = [self.conditions, body.scene.damping, clock.time_step, nodes]
         launch(self._kick, points, inputs, gathers=False)
         self.tools.stop()
-        launch(self._strain, corners, [corners, nodes, self._numbers, clock.faults])
+        launch(self._strain, corners, [self._kappa, corners, nodes, self._numbers, clock.faults])
         least_volume = LEAST_VOLUME / body.scene.material.density
         launch(self._rate, points, [least_volume, body.straining, self._numbers, nodes])
         self._sharpening.weigh()
 
 
 def spacing(mesh: Mesh) -> float:
-    """Least 2 c_p/ω_T of the cells [m], see `warpsph.operators.cell_limit`: of a lattice its spacing."""
-    gradients = np.array(mesh.kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
-    largest = np.linalg.norm(gradients, 2, axis=(1, 2)).max()
-    return float(2.0 / (np.sqrt(mesh.kind.corners) * largest))
+    """Least 2 c_p/ω_T of the cells [m], see `warpsph.operators.cell_limit`: of a lattice its spacing.
+
+    In space 0.975 of it. ω_T is that of a wave along one direction; a free body two cells thick that is nearly
+    incompressible swells along three at once: waves of 3 × 2 × 2 cubes grow from a Courant number of 0.785 on.
+    Σ_j ∇N_j ⊗ ∇N_j of a regular cell is alike in every direction: what counts is the least of a cell's stretches.
+    """
+    kind = mesh.kind
+    regular = np.linalg.norm(np.array(kind.gradients) @ np.linalg.inv(kind.regular), 2)
+    distance = mesh.smallest_distance()
+    if kind.modes:
+        bent, bends, gradients = mesh.bent_cells()
+        if len(bent):
+            share = BENT_SHARE * np.minimum(bends / BENT**2, 1.0)
+            more = share**2 * (1.0 + bends) * (gradients**2).sum(axis=(1, 2))
+            stretches = mesh.least_stretches()[bent]
+            distance = min(distance, (stretches / np.sqrt(1.0 + more * (stretches / regular) ** 2)).min())
+    return float((0.975 if mesh.dim == 3 else 1.0) * 2.0 * distance / (np.sqrt(kind.corners) * regular))
 
 
-# Beside free edges of nearly incompressible bodies waves grow from somewhere between 0.85 and 0.9 on, without
-# sharpening from between 0.95 and 1 on; on endless lattices later (tests/test_stability.py).
-COURANT_LIMIT = 0.85
+COURANT_LIMIT = 0.8  # tests/test_stability.py
 
 CELLS = Scheme(
     name="cells",

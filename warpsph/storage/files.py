@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import itertools
 import json
 import math
@@ -80,9 +81,9 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def remove_parts(folder: Path) -> None:
-    """Remove what writers have left that were killed; those that still live keep theirs."""
-    for path in folder.glob(".*.part*"):
+def remove_parts(folder: Path, stem: str | None = None) -> None:
+    """Remove what writers have left that were killed, of all files or of one stem; those that live keep theirs."""
+    for path in folder.glob(f".{'*' if stem is None else glob.escape(stem)}.*.part*"):
         found = PART.fullmatch(path.name)
         if found and not _lives(int(found[1])) and path.is_file():
             path.unlink(missing_ok=True)

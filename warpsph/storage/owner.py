@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ..errors import SceneError
-from .files import PART
+from .files import PART, remove_parts
 
 try:
     import fcntl
@@ -60,6 +60,7 @@ def owned_file(path: Path, option: str) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
     with _held(mark, option, path, "file"):
         try:
+            remove_parts(path.parent, path.stem)
             yield
         finally:
             with contextlib.suppress(OSError):

@@ -7,6 +7,7 @@ import hashlib
 import json
 import stat
 import sys
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -20,12 +21,16 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+LONGEST = 300  # letters, of what an error may say
+
 
 @contextlib.contextmanager
 def reading(kind: str, path: Path, damaged: str = "it can not be read ({error})") -> Iterator[None]:
-    """Turn all that damaged bytes may raise into one line that names the file."""
+    """Turn all that damaged bytes may raise into one line that names the file; libraries warn of nothing."""
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     except WarpSPHError:
         raise
     except FileNotFoundError:
@@ -33,7 +38,8 @@ def reading(kind: str, path: Path, damaged: str = "it can not be read ({error})"
     except MemoryError:
         raise DamagedError(kind, str(path), damaged.format(error="it is too large for the memory")) from None
     except Exception as error:  # reading damaged bytes may raise anything
-        what = str(error) or type(error).__name__
+        what = str(error) or type(error).__name__  # it may quote what was read, of any length
+        what = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
         raise DamagedError(kind, str(path), damaged.format(error=what)) from None
 
 
