@@ -12,11 +12,11 @@ from tests.test_restart import slope
 from warpsph import SceneError, Simulation
 from warpsph.scene.registry import SCHEMES
 from warpsph.simulation.checkpoint import Checkpoint, seal, write_checkpoint
+from warpsph.simulation.state import COUNTS
 
 FAR_TOO_FAST = """
 from warpsph import *
 from warpsph.scene.registry import SCHEMES
-from warpsph.simulation.state import COUNTS
 
 common = dict(material=Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0), duration=1.0)
 for shape in (Box((1.0, 0.5), 0.25), Box((0.5, 0.5, 0.5), 0.25)):
