@@ -368,7 +368,7 @@ def test_all_kernels_compile_for_cuda(tmp_path):
     modules = {kernel.module for kernel in triangulation(lattice(3, 3)).kernels}
     for module in modules:
         wp.compile_aot_module(module, arch=HOPPER, module_dir=tmp_path, use_ptx=False)
-    assert len(list(tmp_path.glob("*.cubin"))) == len(modules) == 11
+    assert len(list(tmp_path.glob("*.cubin"))) == len(modules)
 
 
 def at(mesh, *place):

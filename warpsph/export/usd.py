@@ -4,7 +4,7 @@
     /Run/MaterialNodes      Points, coloured by one field, with stress, strain and flags as primvars
     /Run/AuxiliaryNodes     Points in the middle of the cells, hidden at first
     /Run/Walls/…            a Mesh for what holds or moves the body's edge
-    /Run/Tools/…            a Mesh for every rigid tool, which is moved as a whole
+    /Run/Tools/…            a Mesh for every rigid tool
 
 Metres and seconds: one second of the time line is one second of the run. Bars and plane strain lie in the xy plane
 of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate is changed.
@@ -123,7 +123,7 @@ class Drawing:
         }
         Usd.ModelAPI(self._root).SetKind(Kind.Tokens.component)
         self._nodes.describe(len(mesh.nodes))
-        self._cells.describe(len(mesh.cells))
+        self._cells.describe(0 if self._frames.about["remade"] else len(mesh.cells))
         UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         for built, prim in self._walls:
             _set_topology(prim, built.polygons)
@@ -131,12 +131,10 @@ class Drawing:
                 self._set_wall(built, prim, mesh.nodes, Usd.TimeCode.Default())
         for tool, prim in zip(self._frames.tools, self._tools, strict=True):
             _set_topology(prim, tool.polygons)
-            _set_points(prim, tool.points, Usd.TimeCode.Default())
-            prim.AddTranslateOp()
 
     def add(self, frame: Frame) -> None:
         """Write a frame at its time code."""
-        code, mesh = Usd.TimeCode(self._frames.code(frame.number)), frame.mesh
+        code, mesh = Usd.TimeCode(self._frames.code(frame.number)), frame.present_mesh
         self._time.Set(frame.time, code)
         position, velocity = frame.field("position"), frame.field("velocity")
         values = self._colouring.quantity(frame)
@@ -144,13 +142,14 @@ class Drawing:
         for name in self._fields:
             self._nodes.set_field(name, frame.field(name), code)
         mean = [mesh.at_centres(field) for field in (position, velocity, values)]
+        if self._frames.about["remade"]:
+            self._cells.number(len(mesh.cells), code)
         self._cells.set(*mean[:2], self._colouring.linear(mean[2]), code)
         for built, prim in self._walls:
             if not built.wall.still:
                 self._set_wall(built, prim, position, code)
-        for tool, start, prim in zip(frame.tools, self._frames.tools, self._tools, strict=True):
-            way = Gf.Vec3d(*(tool.points[0] - start.points[0]).tolist())
-            prim.GetOrderedXformOps()[0].Set(way, code)
+        for tool, prim in zip(frame.tools, self._tools, strict=True):
+            _set_points(prim, tool.points, code)
 
     def span_time(self, codes: Sequence[float]) -> None:
         """Say from where to where the time line goes."""
@@ -193,10 +192,15 @@ class NodePoints:
         self._primvars: dict[str, list[UsdGeom.Primvar]] = {}
 
     def describe(self, count: int) -> None:
-        """Write ids and the width."""
-        self._points.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(count, dtype=np.int64)))
+        """Write ids and the width; no ids, 0, where there are more and less."""
+        if count:
+            self.number(count, Usd.TimeCode.Default())
         self._points.CreateWidthsAttr(Vt.FloatArray([self._width]))
         self._points.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+
+    def number(self, count: int, code: Usd.TimeCode) -> None:
+        """Write ids."""
+        self._points.CreateIdsAttr().Set(Vt.Int64Array.FromNumpy(np.arange(count, dtype=np.int64)), code)
 
     def set(self, position: np.ndarray, velocity: np.ndarray, colour: np.ndarray, code: Usd.TimeCode) -> None:
         """Write positions [m], velocities [m/s], both (n, d), and colours (n, 3) of a frame."""

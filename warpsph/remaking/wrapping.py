@@ -124,12 +124,8 @@ def wrap_kernel(most_seen: int, most_edges: int):
                     seen[count] = node
                     count += 1
                 if there.after != INSIDE:
-                    for way in range(
-                        2
-                    ):  # the edge that starts there; and the one that ends there, from out of reach
-                        other = there.after
-                        if wp.static(way == 1):
-                            other = before[k]
+                    for way in range(2):  # the edge that starts there; the one that ends there, from out of reach
+                        other = wp.where(way == 0, there.after, before[k])
                         end = seen_from(here, other, site[other])
                         if other != i and (way == 0 or square(end.x, end.y) > within):
                             if edges == most_edges:
