@@ -4,7 +4,7 @@
     /Run/MaterialNodes      Points, coloured by one field, with stress, strain and flags as primvars
     /Run/AuxiliaryNodes     Points in the middle of the cells, hidden at first
     /Run/Walls/…            a Mesh for what holds or moves the body's edge
-    /Run/Tools/…            a Mesh for every rigid tool, which is moved as a whole
+    /Run/Tools/…            a Mesh for every rigid tool
 
 Metres and seconds: one second of the time line is one second of the run. Bars and plane strain lie in the xy plane
 of a y-up stage, solids stand in a z-up one, so that down is down: no coordinate is changed.
@@ -131,8 +131,6 @@ class Drawing:
                 self._set_wall(built, prim, mesh.nodes, Usd.TimeCode.Default())
         for tool, prim in zip(self._frames.tools, self._tools, strict=True):
             _set_topology(prim, tool.polygons)
-            _set_points(prim, tool.points, Usd.TimeCode.Default())
-            prim.AddTranslateOp()
 
     def add(self, frame: Frame) -> None:
         """Write a frame at its time code."""
@@ -148,9 +146,8 @@ class Drawing:
         for built, prim in self._walls:
             if not built.wall.still:
                 self._set_wall(built, prim, position, code)
-        for tool, start, prim in zip(frame.tools, self._frames.tools, self._tools, strict=True):
-            way = Gf.Vec3d(*(tool.points[0] - start.points[0]).tolist())
-            prim.GetOrderedXformOps()[0].Set(way, code)
+        for tool, prim in zip(frame.tools, self._tools, strict=True):
+            _set_points(prim, tool.points, code)
 
     def span_time(self, codes: Sequence[float]) -> None:
         """Say from where to where the time line goes."""
