@@ -51,8 +51,9 @@ class Tools:
     def __init__(self, body: CellBody, clock: Clock, offset: int, held, outline=None):
         scene, space, device = body.scene, body.space, body.launcher.device
         self._body, self._clock, self._held = body, clock, held
-        nodes = _outer(scene.mesh) if outline is None else np.arange(len(scene.mesh.nodes))
-        nodes = nodes if scene.tools else np.zeros(0, dtype=np.int64)
+        nodes = np.zeros(0, dtype=np.int64)
+        if scene.tools:
+            nodes = _outer(scene.mesh) if outline is None else np.arange(len(scene.mesh.nodes))
         rows, count, vector = len(nodes), len(scene.tools), space.types.vector
         self._any, self._table = count > 0, tool_table(scene, space, device, offset)
         self._contacts = contacts = contact_types(space)()

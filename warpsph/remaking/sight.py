@@ -33,14 +33,3 @@ def hides(start: Seen, end: Seen, seen: Seen) -> bool:
     to.y = seen.y - start.y
     mine, its = turn(start, end), turn(along, to)
     return (mine > wp.int64(0) and its < wp.int64(0)) or (mine < wp.int64(0) and its > wp.int64(0))
-
-
-@wp.func
-def outside(after: Seen, before: Seen, seen: Seen) -> bool:
-    """Whether a node on the outline would see another between `before` and `after`, where the body is not."""
-    if seen.id == after.id or seen.id == before.id:
-        return False
-    left, right = turn(after, seen) > wp.int64(0), turn(seen, before) > wp.int64(0)
-    if turn(after, before) > wp.int64(0):
-        return not (left and right)
-    return not (left or right)

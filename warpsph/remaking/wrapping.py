@@ -13,7 +13,7 @@ import warp as wp
 from ..device.compiling import forward_kernel
 from .exact import Seen, met_before, square, turn
 from .outline import INSIDE
-from .sight import hides, outside, seen_from
+from .sight import hides, seen_from
 from .sites import Site
 
 MOST_NEIGHBOURS = 24  # that a star has
@@ -124,12 +124,8 @@ def wrap_kernel(most_seen: int, most_edges: int):
                     seen[count] = node
                     count += 1
                 if there.after != INSIDE:
-                    for way in range(
-                        2
-                    ):  # the edge that starts there; and the one that ends there, from out of reach
-                        other = there.after
-                        if wp.static(way == 1):
-                            other = before[k]
+                    for way in range(2):  # the edge that starts there; the one that ends there, from out of reach
+                        other = wp.where(way == 0, there.after, before[k])
                         end = seen_from(here, other, site[other])
                         if other != i and (way == 0 or square(end.x, end.y) > within):
                             if edges == most_edges:
@@ -138,26 +134,21 @@ def wrap_kernel(most_seen: int, most_edges: int):
                                 starts[edges] = node
                                 ends[edges] = end
                                 edges += 1
-        begin, last = wp.int32(-1), wp.int32(-1)
-        if here.after != INSIDE or edges > 0:
-            after, previous = here.after, before[i]
-            kept = wp.int32(0)
-            for m in range(count):
-                node = seen[m]
-                hidden = wp.bool(False)
-                if after != INSIDE:
-                    ahead, behind = seen_from(here, after, site[after]), seen_from(here, previous, site[previous])
-                    hidden = outside(ahead, behind, node)
-                for e in range(edges):
-                    hidden = hidden or hides(starts[e], ends[e], node)
-                if not hidden:
-                    seen[kept] = node
-                    if node.id == after:
-                        begin = kept
-                    if node.id == previous:
-                        last = kept
-                    kept += 1
-            count = kept
+        begin, last, kept = wp.int32(-1), wp.int32(-1), wp.int32(0)
+        after, previous = here.after, before[i]
+        for m in range(count):
+            node = seen[m]
+            hidden = wp.bool(False)
+            for e in range(edges):
+                hidden = hidden or hides(starts[e], ends[e], node)
+            if not hidden:
+                seen[kept] = node
+                if node.id == after:
+                    begin = kept
+                if node.id == previous:
+                    last = kept
+                kept += 1
+        count = kept
         bound = last + 0
         if here.after == INSIDE:
             begin = nearest(seen, count)

@@ -87,11 +87,11 @@ class Numerics:
         """The scheme that `velocity_scheme` names."""
         return scheme_of(self.velocity_scheme)
 
-    def sharpening_of(self, mesh: Mesh, wave_speed: float) -> float:
-        """c of `cells` for a body whose fastest waves have that speed [m/s]."""
+    def sharpening_of(self, mesh: Mesh, wave_speed: float, *, spacing: float) -> float:
+        """c of `cells` for waves of that speed [m/s], with Δx of the Courant number as it is in the body [m]."""
         if self.sharpening is not None:
             return self.sharpening
-        advance = self.courant * self.scheme.spacing(mesh)  # c_p Δt
+        advance = self.courant * spacing  # c_p Δt
         if self.time_step is not None:
             advance = wave_speed * self.time_step
         size = (np.mean(mesh.cell_volumes()) / mesh.kind.volume) ** (1.0 / mesh.dim)  # of a lattice Δx, as mapped

@@ -226,6 +226,17 @@ class Scene:
         return self.shape.mesh()
 
     @cached_property
+    def wave_spacing(self) -> float:
+        """Δx in the Courant number [m], the scheme's."""
+        return self.numerics.scheme.spacing(self.mesh)
+
+    @cached_property
+    def sharpening(self) -> float:
+        """c of the scheme `cells` [-], see `Numerics.sharpening`."""
+        numerics, mesh = self.numerics, self.mesh
+        return numerics.sharpening_of(mesh, self.material.wave_speed(mesh.dim), spacing=self.wave_spacing)
+
+    @cached_property
     def boundary(self) -> BoundaryTable:
         """The conditions, resolved node by node, without the `loads`."""
         conditions = self.conditions

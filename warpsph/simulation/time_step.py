@@ -109,7 +109,7 @@ def time_step_limit(scene: Scene) -> float:
         SceneError: the Courant number (or the given time step) is beyond the wave limit.
     """
     numerics, material, mesh = scene.numerics, scene.material, scene.mesh
-    per_courant = numerics.scheme.spacing(mesh) / material.wave_speed(mesh.dim)
+    per_courant = scene.wave_spacing / material.wave_speed(mesh.dim)
     limit = courant_limit(scene)
     if numerics.time_step is not None:
         if numerics.time_step > limit * per_courant * (1.0 + ROUNDING):

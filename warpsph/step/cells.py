@@ -55,7 +55,7 @@ class CellStepper(Stepper):
         clock = Clock(
             scene.body_force, (*driven, *scene.loads.functions, *scene.tool_functions[0]), space, launcher
         )
-        c = scene.numerics.sharpening_of(scene.mesh, scene.material.wave_speed(space.dim))
+        c = scene.sharpening
         self.body = body = CellBody.of(scene, space, launcher, sharp=c > 0.0)
         device, real, cells = launcher.device, space.real, body.corners.shape[0]
         n, moves = len(scene.mesh.nodes), scene.large_displacements
