@@ -635,6 +635,8 @@ WRONG = {
     "strength": (lambda: Adhesive(-1.0), "Adhesive.strength = -1.0"),
     "lag": (lambda: Coulomb(0.1, lag=-1.0), "Coulomb.lag = -1.0"),
     "radius": (lambda: Cylinder((0.0, 0.0), 0.0), "Cylinder.radius = 0.0"),
+    "far": (lambda: Block((1e308, 0.0), (1.0, 1.0)), "Block.centre = 1e+308 is not allowed: it must be"),
+    "large": (lambda: Cylinder((0.0, 0.0), 1e200), "Cylinder.radius = 1e+200"),
     "normal": (lambda: Plane((0.0, 0.0), (0.0, 0.0)), "must not be the zero vector"),
     "dimension": (lambda: falls(tools=(Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),)), "Plane.point"),
     "axis": (lambda: falls(dim=3, tools=(Cylinder((0.0, 0.0, -2.0), 0.1),)), "Cylinder.axis = None"),

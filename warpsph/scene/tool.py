@@ -120,7 +120,7 @@ class Plane(Tool):
 
     def __post_init__(self):
         super().__post_init__()
-        object.__setattr__(self, "point", vector("Plane.point", self.point))
+        object.__setattr__(self, "point", _place("Plane.point", self.point))
         object.__setattr__(self, "normal", _unit("Plane.normal", self.normal))
 
     def form(self, dim):
@@ -141,8 +141,8 @@ class Sphere(Tool):
 
     def __post_init__(self):
         super().__post_init__()
-        object.__setattr__(self, "centre", vector("Sphere.centre", self.centre))
-        object.__setattr__(self, "radius", number("Sphere.radius", self.radius, above=0.0))
+        object.__setattr__(self, "centre", _place("Sphere.centre", self.centre))
+        object.__setattr__(self, "radius", number("Sphere.radius", self.radius, above=0.0, at_most=ENDLESS))
 
     def form(self, dim):
         if dim != 3:
@@ -168,12 +168,12 @@ class Cylinder(Tool):
 
     def __post_init__(self):
         super().__post_init__()
-        object.__setattr__(self, "centre", vector("Cylinder.centre", self.centre))
-        object.__setattr__(self, "radius", number("Cylinder.radius", self.radius, above=0.0))
+        object.__setattr__(self, "centre", _place("Cylinder.centre", self.centre))
+        object.__setattr__(self, "radius", number("Cylinder.radius", self.radius, above=0.0, at_most=ENDLESS))
         if self.axis is not None:
             object.__setattr__(self, "axis", _unit("Cylinder.axis", self.axis))
         if self.length is not None:
-            object.__setattr__(self, "length", number("Cylinder.length", self.length, above=0.0))
+            object.__setattr__(self, "length", number("Cylinder.length", self.length, above=0.0, at_most=ENDLESS))
 
     def form(self, dim):
         if dim == 1:
@@ -211,8 +211,8 @@ class Block(Tool):
 
     def __post_init__(self):
         super().__post_init__()
-        object.__setattr__(self, "centre", vector("Block.centre", self.centre))
-        object.__setattr__(self, "size", vector("Block.size", self.size))
+        object.__setattr__(self, "centre", _place("Block.centre", self.centre))
+        object.__setattr__(self, "size", _place("Block.size", self.size))
         for part in self.size:
             number("Block.size", part, above=0.0)
         object.__setattr__(self, "angle", number("Block.angle", self.angle))
@@ -228,6 +228,11 @@ class Block(Tool):
             cos, sin = math.cos(self.angle), math.sin(self.angle)
             axes[:2, :2] = [[cos, sin], [-sin, cos]]
         return Form(centre, axes, 0.5 * size - self.rounding, self.rounding)
+
+
+def _place(name: str, given: object) -> tuple[float, ...]:
+    """Lengths [m] whose squares are numbers."""
+    return tuple(number(name, part, at_least=-ENDLESS, at_most=ENDLESS) for part in vector(name, given))
 
 
 def _unit(name: str, given: object) -> tuple[float, ...]:
