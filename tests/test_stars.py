@@ -381,7 +381,10 @@ def surfaced(mesh, points, joining, held=()):
     made, placed = triangulation(mesh), positions(points)
     made.surfacing.held.assign(np.isin(np.arange(len(points)), held).astype(np.int32))
     assert made.make(placed)
-    made.surface(placed, joining)
+    if joining:
+        made.join(placed, wp.zeros_like(placed))
+    else:
+        made.leave(placed)
     assert made.renew(placed)
     after, before = made.outline.after.numpy(), made.outline.before.numpy()
     rim = np.flatnonzero(after != INSIDE)

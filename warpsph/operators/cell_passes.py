@@ -7,8 +7,8 @@ viscosity, no smooth motion does.
 
 Where soil flows velocities have kinks, and what serves bending and waves only carries load: κ and the sharpening
 of a cell are multiplied by e_T, 0 if a corner has flowed in this step, and 0.1, 0.19, … in those that follow. What
-is rough is then met by a stress of 0.3 q of the cell at most: soil cannot carry more of it. Bent cells lose both
-too, and get another κ for it.
+is rough is then met by a stress of the cell's q at most: soil cannot carry more. Bent cells lose both too,
+and get another κ for it.
 """
 
 from functools import cache
@@ -31,9 +31,9 @@ from .cell_shape import cell_shape
 # elastic bodies layers of a bar of jittered hexahedra, spinning with half of c_s at its rim, drifted to and fro
 # until they folded; sharpened cells with that κ grow.
 FLOWING_SHARE, BENT_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
-# Of q, the most that viscosity adds to the stress of a cell that flows. With 0.1 a clay column folds in the
-# middle; with no such bound one of γH/c_u = 20 is torn (cells made anew).
-ROUGH = 0.3
+# Of q, the most that viscosity adds to the stress of a cell that flows: of what is rough soil can carry no more than
+# its strength. With less, columns of clay fold (0.1 and 0.3, docs/method.md).
+ROUGH = 1.0
 
 
 def corner_share(sharpening: float) -> float:

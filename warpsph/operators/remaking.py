@@ -62,6 +62,7 @@ class Remaking:
         self.outline = made.outline
         self._triangulation, self._kept = made, outline_arrays(outline, device)
         self._positions = wp.zeros(n, dtype=space.types.vector, device=device)
+        self._ways = wp.zeros(n, dtype=space.types.vector, device=device)  # until nodes join again
         self._volume = wp.zeros(n, dtype=real, device=device)
         self._flag = wp.zeros(1, dtype=wp.int32, device=device)
         self._positions_of, self._wear = _positions_kernel(space), _wear_kernel(space, body.kind)
@@ -104,7 +105,8 @@ class Remaking:
 
     def _places(self) -> wp.array:
         """Where the nodes are [m]."""
-        self._body.launcher.launch(self._positions_of, self._positions, [self._body.nodes, self._positions])
+        inputs = [2 * self._every, self._clock.time_step, self._body.nodes, self._positions, self._ways]
+        self._body.launcher.launch(self._positions_of, self._positions, inputs)
         return self._positions
 
     def _worn(self) -> bool:
@@ -119,8 +121,10 @@ class Remaking:
         if not triangulation.sound or triangulation.generation != self.made:  # or the state is another one's
             triangulation.adopt(self._body.corners, self._body.node_cells)
             triangulation.generation = self.made
-        if surfacing:
-            triangulation.surface(positions, self.joining)
+        if surfacing and self.joining:
+            triangulation.join(positions, self._ways)
+        elif surfacing:
+            triangulation.leave(positions)
         return triangulation.renew(positions)
 
     def _replace(self, tables: CellTables) -> None:
@@ -150,12 +154,21 @@ def _count(first: int, every: int, steps: wp.array(dtype=wp.int32), outdated: wp
 
 @cache
 def _positions_kernel(space: Space):
-    CellNodes = cell_node_types(space)[1]
+    real, CellNodes, vector = space.real, cell_node_types(space)[1], space.types.vector
 
     @forward_kernel
-    def positions(first: int, nodes: CellNodes, result: wp.array(dtype=space.types.vector)):
+    def positions(
+        first: int,
+        steps: int,
+        time_step: wp.array(dtype=real),
+        nodes: CellNodes,
+        result: wp.array(dtype=vector),
+        ways: wp.array(dtype=vector),
+    ):
+        """Where nodes are [m], and how far so many steps take them."""
         i = first + wp.tid()
         result[i] = nodes.point[i].x
+        ways[i] = real(steps) * time_step[0] * space.phi.velocity(nodes.point[i].phi)
 
     return positions
 

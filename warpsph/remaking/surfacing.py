@@ -1,9 +1,9 @@
 """Nodes that come to the outline, and nodes that leave it, where its edges have grown long or short.
 
-A node inside that has come near an edge, and sees it all but straight, joins it: the cell between them would turn
-over next. It is moved onto the edge, so that no area is made or lost, and the edge becomes two. A node of the
-outline with short edges on both sides, all but in line, is moved inside, and both become one. Each node decides
-for itself, and looks at stars only.
+A node inside that has come near an edge, and sees it all but straight, or will before nodes join again, joins it:
+the cell between them would turn over next. It is moved onto the edge, so that no area is made or lost, and the edge
+becomes two. A node of the outline with short edges on both sides, all but in line, is moved inside, and both become
+one. Each node decides for itself, and looks at stars only.
 """
 
 from functools import cache
@@ -52,10 +52,17 @@ class Surfacing:
         self._places = wp.zeros(n, dtype=precision.vec(2), device=launcher.device)
         self.kernels = (self._find, _join, self._wish, _leave, self._move)
 
-    def join(self, positions: wp.array, stars: Stars, outline: OutlineArrays) -> None:
-        """Move nodes [m] onto edges of the outline, of which they are then a part."""
+    def join(self, positions: wp.array, ways: wp.array, stars: Stars, outline: OutlineArrays) -> None:
+        """Move nodes [m] onto edges of the outline, of which they are then a part.
+
+        Args:
+            positions: of the nodes [m].
+            ways: how far they will have come when nodes join again [m].
+            stars: of the nodes.
+            outline: where they join.
+        """
         launch, onto = self._launcher.launch, self._chosen
-        inputs = [STRAIGHT / self._spacing**2, self.held, positions, stars, outline, onto]
+        inputs = [STRAIGHT / self._spacing**2, self.held, positions, ways, stars, outline, onto]
         launch(self._find, onto, inputs)
         launch(_join, onto, [onto, stars, outline])
 
@@ -75,12 +82,17 @@ def _find_kernel(precision: Precision):
     """Of each node the start of the edge that it joins, or `INSIDE`; it is moved there."""
     real, vector = precision.real, precision.vec(2)
 
+    @wp.func
+    def cross(a: vector, b: vector):
+        return a[0] * b[1] - a[1] * b[0]
+
     @forward_kernel
     def find(
         first: int,
         share: real,
         held: wp.array(dtype=wp.int32),
         positions: wp.array(dtype=vector),
+        ways: wp.array(dtype=vector),
         stars: Stars,
         outline: OutlineArrays,
         onto: wp.array(dtype=wp.int32),
@@ -94,9 +106,10 @@ def _find_kernel(precision: Precision):
                 if outline.after[a] == b and held[a] + held[b] < 2:
                     start, end = positions[a] - x, positions[b] - x
                     ahead = -wp.dot(start, end)
-                    height = start[0] * end[1] - start[1] * end[0]
+                    height = cross(start, end)
+                    later = cross(start + ways[a] - ways[i], end + ways[b] - ways[i])
                     edge = end - start
-                    near = height < share * wp.dot(edge, edge) * ahead
+                    near = wp.min(height, later) < share * wp.dot(edge, edge) * ahead
                     if ahead > real(0.0) and near and height < least * ahead:
                         least = height / ahead
                         joined = a

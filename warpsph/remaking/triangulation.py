@@ -100,10 +100,13 @@ class Triangulation:
         self._launcher.launch(_adopt, self._stars.degree, inputs)
         self.sound = True
 
-    def surface(self, positions: wp.array, joining: bool) -> None:
-        """Take nodes [m] onto the outline, or off it, before cells are renewed."""
-        change = self.surfacing.join if joining else self.surfacing.leave
-        change(positions, self._stars, self.outline)
+    def join(self, positions: wp.array, ways: wp.array) -> None:
+        """Take nodes [m] onto the outline before cells are renewed; `ways`: see `Surfacing.join`."""
+        self.surfacing.join(positions, ways, self._stars, self.outline)
+
+    def leave(self, positions: wp.array) -> None:
+        """Take nodes [m] off the outline before cells are renewed."""
+        self.surfacing.leave(positions, self._stars, self.outline)
 
     def _place(self, positions: wp.array) -> None:
         self._sites.place(positions)
