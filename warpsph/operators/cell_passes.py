@@ -31,8 +31,8 @@ from .cell_shape import cell_shape
 # elastic bodies layers of a bar of jittered hexahedra, spinning with half of c_s at its rim, drifted to and fro
 # until they folded; sharpened cells with that κ grow.
 FLOWING_SHARE, BENT_SHARE, BENT = 0.04, 2.0 / 3.0, 0.5
-# Of q, the most that viscosity adds to the stress of a cell that flows: of what is rough soil can carry no more than
-# its strength. With less, columns of clay fold (0.1 and 0.3, docs/method.md).
+# Of q, the most that viscosity adds to the stress of a cell that flows: of what is rough soil can carry no more
+# than its strength. With less, columns of clay fold (0.1 and 0.3, docs/method.md).
 ROUGH = 1.0
 
 

@@ -1,9 +1,9 @@
 """Nodes that come to the outline, and nodes that leave it, where its edges have grown long or short.
 
 A node inside that has come near an edge, and sees it all but straight, or will before nodes join again, joins it:
-the cell between them would turn over next. It is moved onto the edge, so that no area is made or lost, and the edge
-becomes two. A node of the outline with short edges on both sides, all but in line, is moved inside, and both become
-one. Each node decides for itself, and looks at stars only.
+the cell between them would turn over next. It is moved onto the edge, so that no area is made or lost, and the
+edge becomes two. A node of the outline with short edges on both sides, all but in line, is moved inside, and both
+become one. Each node decides for itself, and looks at stars only.
 """
 
 from functools import cache
