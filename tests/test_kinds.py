@@ -14,7 +14,6 @@ from warpsph.physics.space import Space
 from warpsph.scene import CONTINUA
 from warpsph.state.cells import cell_table
 from warpsph.state.nodes import auxiliary_nodes
-from warpsph.step.cells import spacing
 
 every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
 SOFT = Elastic(young_modulus=1e6, poisson_ratio=0.3, density=1000.0)
@@ -193,12 +192,13 @@ def test_small_matrices_against_lapack(dim):
 
 
 @every_kind
-def test_spacing_of_the_time_step_follows_from_the_gradients_of_every_cell(kind):
-    """2/(√n |∇N|), |·| the largest singular value: the fastest waves a cell knows (`operators/cell_limit.py`)."""
+def test_waves_in_the_middle_of_a_cell_follow_from_the_least_of_its_stretches(kind):
+    """√(λ_max Σ_j ∇N_j ⊗ ∇N_j), the bound of `operators/cell_limit.py`, times it is what a regular cell has."""
     mesh = shaken(kind)
     gradients = np.array(kind.gradients) @ np.linalg.inv(mesh.cell_jacobians())
-    largest = [np.linalg.norm(cell, 2) for cell in gradients]
-    assert spacing(mesh) == pytest.approx(2.0 / (np.sqrt(kind.corners) * max(largest)), rel=1e-12)
+    regular = np.array(kind.gradients) @ np.linalg.inv(kind.regular)
+    largest = np.linalg.norm(gradients, 2, axis=(1, 2))
+    assert largest * mesh.least_stretches() == pytest.approx(np.linalg.norm(regular, 2), rel=1e-12)
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])

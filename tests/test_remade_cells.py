@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import warp as wp
+from pxr import Usd, UsdGeom
 
 from warpsph import (
     BodyForce,
@@ -21,6 +22,12 @@ from warpsph import (
     Traction,
     edge,
 )
+from warpsph.errors import DamagedError
+from warpsph.export.frame_files import frame_paths
+from warpsph.export.pictures.field import plot_frame
+from warpsph.export.quantity import quantity
+from warpsph.export.usd import write_stage
+from warpsph.frames import Frames, FrameWriter, evenly
 
 HOPPER = 90  # compute capability 9.0
 HEIGHT, WIDTH, DENSITY, GRAVITY = 2.0, 2.0, 1800.0, 9.81
@@ -199,3 +206,33 @@ def test_all_kernels_compile_for_cuda(tmp_path):
     for module in modules:
         wp.compile_aot_module(module, arch=HOPPER, module_dir=tmp_path, use_ptx=False)
     assert len(list(tmp_path.glob("*.cubin"))) == len(modules) > 15
+
+
+def test_frames_pictures_and_exports_have_the_cells_of_their_time(tmp_path):
+    """As the simulation has them; at the start those of the scene. A damaged cell is refused in one line."""
+    simulation = Simulation(column(cells=Remade(), duration=0.7), "cpu")
+    writer = FrameWriter(simulation, evenly(0.7, 2), tmp_path)
+    simulation.run(observers=[writer])
+    frames = Frames(tmp_path)
+    first, last = frames[0], frames[-1]
+    assert np.array_equal(np.sort(first.present_mesh.cells), np.sort(simulation.mesh.cells))
+    assert np.array_equal(last.present_mesh.cells, simulation.present_mesh.cells)
+    assert not np.array_equal(last.present_mesh.cells, first.present_mesh.cells)
+    now = last.present_mesh.with_nodes(last.field("position")).cell_volumes().sum()
+    assert now == pytest.approx(area(simulation), rel=1e-6)
+    ask = quantity("equivalent_plastic_strain", frames)
+    plot_frame(frames, ask, frame=last, path=tmp_path / "last.png")
+    write_stage(frames, tmp_path / "column.usdc")
+    stage = Usd.Stage.Open(str(tmp_path / "column.usdc"))
+    middles = UsdGeom.Points(stage.GetPrimAtPath("/Run/AuxiliaryNodes"))
+    for frame in (first, last):
+        code = frames.code(frame.number)
+        assert len(middles.GetPointsAttr().Get(code)) == len(frame.present_mesh.cells)
+        assert len(middles.GetIdsAttr().Get(code)) == len(frame.present_mesh.cells)
+    path = frame_paths(tmp_path)[-1]
+    with np.load(path) as arrays:
+        parts = dict(arrays)
+    parts["cells"][3, 1] = 10**6
+    np.savez(path, **parts)
+    with pytest.raises(DamagedError, match="cells"):
+        frames[-1]

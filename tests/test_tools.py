@@ -17,6 +17,7 @@ from warpsph import (
     Cylinder,
     Elastic,
     Fixed,
+    GivenMesh,
     Glued,
     History,
     Linear,
@@ -25,6 +26,7 @@ from warpsph import (
     Plane,
     PrescribedVelocity,
     Probe,
+    Ramp,
     Roller,
     Rough,
     Scene,
@@ -202,6 +204,42 @@ def test_no_node_is_behind_a_surface(name):
     assert met > 0.0
 
 
+def test_a_node_that_lands_is_on_the_surface_at_once():
+    simulation = Simulation(falls(), device="cpu", threads=1)
+    while not simulation.stepper.tools.impulse(0).any():
+        simulation.step()
+    lowest = simulation.field("position")[:, 1].min()
+    assert -simulation.field("displacement")[:, 1].min() + 1e-6 > 0.01 and abs(lowest) < 1e-12
+
+
+def spike():
+    """A narrow triangle of triangles, its tip down."""
+    rows = [[(0.02 * (k - 0.5 * r), 0.05 * r) for k in range(r + 1)] for r in range(5)]
+    first = [r * (r + 1) // 2 for r in range(5)]
+    up = [(first[r] + k, first[r + 1] + k + 1, first[r + 1] + k) for r in range(4) for k in range(r + 1)]
+    down = [(first[r] + k, first[r] + k + 1, first[r + 1] + k + 1) for r in range(4) for k in range(r)]
+    return GivenMesh(points=[point for row in rows for point in row], cells=up + down)
+
+
+@pytest.mark.parametrize("steep", [1.0, 2.0, 3.0])
+def test_a_tip_stays_between_two_planes(steep):
+    """It falls into a corner of 90 to 37 degrees: both planes push one node."""
+    sides = (
+        Plane((0.0, -0.05), (steep, 1.0), interface=Coulomb(0.2), name="left"),
+        Plane((0.0, -0.05), (-steep, 1.2), name="right"),
+    )
+    scene = falls(shape=spike(), tools=sides, body_force=BodyForce((1.0, -30.0)), duration=0.3)
+    simulation, deepest = Simulation(scene, device="cpu", threads=1), 0.0
+    for k in range(1, 101):
+        simulation.run(until=k * scene.duration / 100)
+        gaps = [side.form(2).distance(simulation.field("position")).min() for side in sides]
+        deepest = min(deepest, *gaps)
+    assert deepest > -1e-4 * scene.mesh.spacing
+    assert all(np.abs(simulation.stepper.tools.impulse(t)).max() > 0.0 for t in (0, 1))
+    balance = simulation.energy()
+    assert balance.tools < 0.0 and abs(balance.unaccounted) < 0.05 * balance.largest
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_what_tools_get_the_body_lacks(name):
     """Momentum: what came in by gravity and conditions, less what tools got, to 1e-12 of what was exchanged."""
@@ -303,7 +341,10 @@ def test_a_plane_that_presses_is_a_prescribed_velocity():
     bottom = Roller(edge("bottom"))
     moved = PrescribedVelocity(edge("top"), (None, Linear(-8.0)))
     plate = Plane((0.0, 0.6), (0.0, -1.0), velocity=(0.0, Linear(-8.0)))
-    compared(Scene(conditions=[bottom], tools=(plate,), **common), Scene(conditions=[bottom, moved], **common))
+    names = ("displacement", "stress", "velocity")
+    compared(
+        Scene(conditions=[bottom], tools=(plate,), **common), Scene(conditions=[bottom, moved], **common), names
+    )
 
 
 @pytest.mark.parametrize("interface", [Glued(), Rough()])
@@ -501,6 +542,26 @@ def test_probes_of_tools_are_columns_of_the_history():
     assert history["torque"][-1] == tools.torque(1)[2] != 0.0
     assert history["given"][-1] == tools.impulse(0)[1] < 0.0
     assert history["energy.tools"][-1] == simulation.energy().tools
+
+
+@pytest.mark.parametrize("steps", [2_000, pytest.param(1_000_000, marks=pytest.mark.long)])
+def test_a_heap_at_rest_does_not_creep(steps):
+    """Of soil, on ground that leans a little: held by friction, node by node."""
+    scene = Scene(
+        shape=Box((0.8, 0.2), 0.1, origin=(-0.4, 0.0)).mapped(lambda x, y: (x * (1.0 - 1.5 * y), y)),
+        material=SOIL,
+        body_force=BodyForce((0.5, -G), Ramp(0.5)),
+        damping=20.0,
+        tools=(replace(GROUND, interface=Coulomb(0.4)),),
+        duration=1e5,
+    )
+    simulation = Simulation(scene, device="cpu", threads=1)
+    simulation.run(until=6.0)
+    before, weight = simulation.field("position"), simulation.field("mass").sum() * np.array([0.5, -G])
+    simulation.run(until=simulation.time + steps * simulation.time_step_limit)
+    assert simulation.field("position") == pytest.approx(before, abs=1e-14)
+    assert np.abs(simulation.field("velocity")).max() < 1e-14
+    assert simulation.stepper.tools.force(0) == pytest.approx(weight, rel=1e-10)
 
 
 # Bits

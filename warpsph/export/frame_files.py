@@ -79,6 +79,7 @@ RULES = {
     "curve_reference": lambda value: _pair(value, _number),
     "walls": lambda value: isinstance(value, list) and all(map(_wall, value)),
     "tools": lambda value: isinstance(value, list) and all(map(_name, value)),
+    "remade": lambda value: isinstance(value, bool),
 }
 
 
@@ -130,7 +131,7 @@ def frame_path(run: Path, number: int) -> Path:
 
 
 def read_frame(path: Path, about: Mapping, mesh: Mesh) -> dict[str, np.ndarray]:
-    """A frame's time, step and fields, and how far its tools have come, `tools`, where it has any.
+    """A frame's time, step and fields; `tools`, how far they have come, and `cells`, where they are made anew.
 
     Args:
         path: its file.
@@ -143,12 +144,16 @@ def read_frame(path: Path, about: Mapping, mesh: Mesh) -> dict[str, np.ndarray]:
     arrays = read_arrays("frame", path, "it can not be read ({error}); to do without it, remove it")
     with reading("frame", path, "it can not be read ({error}); to do without it, remove it"):
         tools = {"tools"} if about["tools"] else set()
-        names = {"time", "step", *about["fields"]} | tools
+        names = {"time", "step", *about["fields"]} | tools | ({"cells"} if about["remade"] else set())
         require(arrays.keys() == names, "it has other fields than about.json says")
         require(check_array("time", arrays["time"], shape=()) >= 0.0, "its time is below 0")
         require(check_array("step", arrays["step"], kind="iu", shape=()) >= 0, "its step is below 0")
         for name in about["fields"]:
             check_array(name, arrays[name], shape=_shape(name, mesh))
+        if about["remade"]:
+            cells = check_array("cells", arrays["cells"], kind="iu", shape=(None, mesh.kind.corners))
+            check_indices("cells", cells, len(mesh.nodes))
+            require(len(cells) > 0, "it has no cells")
         for name in tools:
             check_array(name, arrays[name], shape=(len(about["tools"]), mesh.dim))
     return arrays

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..analysis import green_strain, mean_stress, von_mises
 from ..errors import SceneError, one_of
+from ..mesh.faces import mesh_of_cells
 from ..mesh.mesh import ARRAYS, Mesh
 from ..simulation.fields import FIELDS, fields_of, internal_variables
 from ..simulation.simulation import Simulation
@@ -115,6 +116,7 @@ class FrameWriter:
             "curve_reference": output.curve_reference,
             "walls": [{"name": wall.name, "still": wall.still} for wall in walls],
             "tools": [tool.name for tool in tools],
+            "remade": simulation.scene.cells is not None,
         }
         write_json(self._run / FOLDER / ABOUT, about)
 
@@ -127,6 +129,8 @@ class FrameWriter:
         path = frame_path(self._run, passed - 1)
         if passed and not path.exists():
             fields = {name: simulation.field(name).astype(np.float32) for name in self._fields}
+            if simulation.scene.cells is not None:
+                fields["cells"] = simulation.present_mesh.cells.astype(np.int32)
             if simulation.scene.tools:
                 fields["tools"] = simulation.stepper.tools.travel.numpy()
             save_arrays(path, {"time": simulation.time, "step": simulation.steps} | fields)
@@ -148,6 +152,7 @@ class Frame:
         time: simulated time [s].
         step: number of the step.
         mesh: the initial mesh, without its tags.
+        present_mesh: the initial nodes with the cells as they are then.
         stored: the stored fields, name → values.
         tools: the tools where they are.
     """
@@ -156,6 +161,7 @@ class Frame:
     time: float
     step: int
     mesh: Mesh
+    present_mesh: Mesh
     stored: Mapping[str, np.ndarray]
     tools: tuple[ToolMesh, ...] = ()
 
@@ -252,7 +258,9 @@ class Frames(Sequence):
         stored = read_frame(frame_path(self.run, number), self.about, self.mesh)
         time, step, travel = float(stored.pop("time")), int(stored.pop("step")), stored.pop("tools", ())
         tools = tuple(tool.moved(way) for tool, way in zip(self.tools, travel, strict=True))
-        return Frame(number, time, step, self.mesh, stored, tools)
+        mesh = self.mesh
+        present = mesh_of_cells(mesh.nodes, stored.pop("cells"), mesh.spacing) if self.about["remade"] else mesh
+        return Frame(number, time, step, mesh, present, stored, tools)
 
     def code(self, number: int) -> float:
         """A frame's place on a time line of `rate` codes a second; whole numbers for evenly spaced times."""

@@ -77,9 +77,9 @@ def _body(frame: Frame, fields: tuple[str, ...]):
     body.SetPoints(points)
     body.SetVerts(_cells(np.arange(len(frame.mesh.nodes))[:, None]))
     if frame.mesh.dim == 1:
-        body.SetLines(_cells(frame.mesh.cells))
+        body.SetLines(_cells(frame.present_mesh.cells))
     else:
-        body.SetPolys(_cells(_polygons(frame.mesh)))
+        body.SetPolys(_cells(_polygons(frame.present_mesh)))
     for name in fields:
         if name != "position":
             body.GetPointData().AddArray(_array(name, frame.field(name), frame.mesh))

@@ -21,6 +21,7 @@ class Snapshot(Protocol):
     """What can be drawn: a frame, or a simulation as it is now."""
 
     mesh: Mesh
+    present_mesh: Mesh
     time: float
 
     def field(self, name: str) -> np.ndarray:

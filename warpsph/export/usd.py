@@ -123,7 +123,7 @@ class Drawing:
         }
         Usd.ModelAPI(self._root).SetKind(Kind.Tokens.component)
         self._nodes.describe(len(mesh.nodes))
-        self._cells.describe(len(mesh.cells))
+        self._cells.describe(0 if self._frames.about["remade"] else len(mesh.cells))
         UsdGeom.Imageable(self._cells.prim).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
         for built, prim in self._walls:
             _set_topology(prim, built.polygons)
@@ -134,7 +134,7 @@ class Drawing:
 
     def add(self, frame: Frame) -> None:
         """Write a frame at its time code."""
-        code, mesh = Usd.TimeCode(self._frames.code(frame.number)), frame.mesh
+        code, mesh = Usd.TimeCode(self._frames.code(frame.number)), frame.present_mesh
         self._time.Set(frame.time, code)
         position, velocity = frame.field("position"), frame.field("velocity")
         values = self._colouring.quantity(frame)
@@ -142,6 +142,8 @@ class Drawing:
         for name in self._fields:
             self._nodes.set_field(name, frame.field(name), code)
         mean = [mesh.at_centres(field) for field in (position, velocity, values)]
+        if self._frames.about["remade"]:
+            self._cells.number(len(mesh.cells), code)
         self._cells.set(*mean[:2], self._colouring.linear(mean[2]), code)
         for built, prim in self._walls:
             if not built.wall.still:
@@ -190,10 +192,15 @@ class NodePoints:
         self._primvars: dict[str, list[UsdGeom.Primvar]] = {}
 
     def describe(self, count: int) -> None:
-        """Write ids and the width."""
-        self._points.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(count, dtype=np.int64)))
+        """Write ids and the width; no ids, 0, where there are more and less."""
+        if count:
+            self.number(count, Usd.TimeCode.Default())
         self._points.CreateWidthsAttr(Vt.FloatArray([self._width]))
         self._points.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+
+    def number(self, count: int, code: Usd.TimeCode) -> None:
+        """Write ids."""
+        self._points.CreateIdsAttr().Set(Vt.Int64Array.FromNumpy(np.arange(count, dtype=np.int64)), code)
 
     def set(self, position: np.ndarray, velocity: np.ndarray, colour: np.ndarray, code: Usd.TimeCode) -> None:
         """Write positions [m], velocities [m/s], both (n, d), and colours (n, 3) of a frame."""

@@ -208,8 +208,9 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
         P = unit()
         if held.row[i] >= 0:
             P = held.projector[held.row[i]]
-        v, met = before + vector(), wp.int32(0)
-        for sweep in range(wp.static(sweeps)):
+        v, met, rounds = before + vector(), wp.int32(0), wp.int32(sweeps)
+        for sweep in range(rounds):
+            pushes = wp.int32(0)
             for t in range(touched.shape[1]):
                 if wp.static(not ends) or touched[row, t] == 1:
                     at = middle(t, table, travel)
@@ -246,10 +247,16 @@ def contact_kernel(space: Space, law: Law, *, ends: bool, strong: bool, sweeps: 
                         contacts.total[row, t] = contacts.total[row, t] + exactly(push)
                         v = w
                         met = wp.int32(1)
+                        pushes = wp.int32(1)
                         if wp.static(not ends):
                             meeting[row] = 1
                     if wp.static(not ends):
-                        touched[row, t] = wp.where(sweep == 0, meets, wp.max(meets, touched[row, t]))
+                        if sweep == 0:
+                            touched[row, t] = meets
+                        elif meets == 1:
+                            touched[row, t] = 1
+            if pushes == 0:
+                break
         pushed = (mass / decay) * (v - before)
         if wp.static(ends):
             contacts.settled[row] = pushed

@@ -41,7 +41,8 @@ def _share_kernel(space: Space):
     def share(first: int, outline: OutlineArrays, nodes: CellNodes, vectors: wp.array(dtype=vector)):
         i = first + wp.tid()
         result = vector()
-        after, before = outline.after[i], outline.before[i]
+        after = outline.after[i]
+        before = outline.before[i]
         if after != INSIDE:
             along = real(0.5) * (nodes.point[after].x - nodes.point[before].x)
             result = vector(along[1], -along[0])

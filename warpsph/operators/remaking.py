@@ -84,10 +84,12 @@ class Remaking:
         self.outdated.zero_()
         triangulation, kept = self._triangulation, self._kept
         if not self.begun:
-            if not self._worn() or not triangulation.make(self._places()):
-                return
-            self.begun = True
-            self._replace(triangulation.tables)
+            if self._worn():
+                self.begun = triangulation.make(self._places())
+                if self.begun:
+                    self._replace(triangulation.tables)
+                else:
+                    self.refused += 1
             return
         copy_outline(kept, self.outline)
         sound = self._renew(surfacing=True)

@@ -150,7 +150,9 @@ def _wish_kernel(precision: Precision):
     ):
         i = first + wp.tid()
         wishes[i] = 0
-        after, before, degree = outline.after[i], outline.before[i], stars.degree[i]
+        after = outline.after[i]
+        before = outline.before[i]
+        degree = stars.degree[i]
         if after == INSIDE or held[i] != 0 or degree < 2:
             return
         x, ahead, behind = positions[i], positions[after], positions[before]
@@ -213,7 +215,8 @@ def _leave(
 @wp.func
 def _leaves(i: int, wishes: wp.array(dtype=wp.int32), outline: OutlineArrays) -> bool:
     """Whether a node of the outline leaves it."""
-    after, before = outline.after[i], outline.before[i]
+    after = outline.after[i]
+    before = outline.before[i]
     if wishes[i] == 0 or outline.after[after] == before:
         return False
     first = wishes[after] == 0 or hash_of(i) < hash_of(after)

@@ -14,6 +14,7 @@ from ..device.exclusive import exclusive
 from ..device.launching import Launcher
 from ..device.precision import precision as precision_of
 from ..errors import SceneError, one_of
+from ..mesh.mesh import Mesh
 from ..physics.space import Space
 from ..scene.place import node_at
 from ..scene.scene import Scene
@@ -94,6 +95,11 @@ class Simulation:
         self.time, self.steps, self.wall_time = 0.0, 0, 0.0
         self.shortest_step, self.longest_step = float("inf"), 0.0
         self.largest_energy = 0.0
+
+    @property
+    def present_mesh(self) -> Mesh:
+        """The nodes where they began, with the cells as they are now: `mesh`, unless they are made anew."""
+        return self.stepper.body.mesh()
 
     @property
     def time_step_limit(self) -> float:

@@ -12,6 +12,7 @@ from ..device.launching import Launcher
 from ..errors import SceneError
 from ..materials.law import Law
 from ..mesh.kinds import CellKind
+from ..mesh.mesh import Mesh
 from ..physics.space import Space
 from ..scene.scene import Scene
 
@@ -39,6 +40,10 @@ class Body(ABC):
     nodes: object
     internals: wp.array | None
     launcher: Launcher
+
+    def mesh(self) -> Mesh:
+        """The nodes where they began, and the cells as they are now."""
+        return self.scene.mesh
 
     @abstractmethod
     def density(self) -> np.ndarray:

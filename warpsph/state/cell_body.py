@@ -1,12 +1,13 @@
 """A body of the scheme `cells` on a device: its nodes, and what a pass over the cells leaves of each."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import warp as wp
 
 from ..device.launching import Launcher
+from ..mesh.faces import mesh_of_cells
 from ..mesh.mesh import Mesh
 from ..physics.space import Space
 from ..scene.scene import Scene
@@ -126,12 +127,10 @@ class CellBody(Body):
         )
 
     def mesh(self) -> Mesh:
-        """The nodes at the start, and the cells as they are now; of those made anew without the boundary."""
-        mesh = self.scene.mesh
         if self.scene.cells is None:
-            return mesh
+            return super().mesh()
         cells = self.corners.numpy()[self.cell_mass.numpy() > 0.0]
-        return replace(mesh, cells=cells)
+        return mesh_of_cells(self.scene.mesh.nodes, cells, self.scene.mesh.spacing)
 
     def density(self) -> np.ndarray:
         """ρ of the nodes [kg/mᵈ], shape (n,): m over the volume of their cells as they are now."""

@@ -92,11 +92,13 @@ class View:
         elif len(self.low) == 2:
             outlines = [tool.outline for tool in _tools(frame)]
             axes.add_collection(PolyCollection(outlines, facecolor=TOOL, edgecolor="black", linewidth=0.6))
-            draw_cells(axes, frame.mesh.with_nodes(position), values, span=self.span, **style)
+            draw_cells(axes, frame.present_mesh.with_nodes(position), values, span=self.span, **style)
             axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
         else:
-            colours = matplotlib.colormaps[COLOUR_MAP](Normalize(*self.span)(_of_faces(frame.mesh, values)))
-            _solid(axes, frame.mesh, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
+            colours = matplotlib.colormaps[COLOUR_MAP](
+                Normalize(*self.span)(_of_faces(frame.present_mesh, values))
+            )
+            _solid(axes, frame.present_mesh, position, facecolors=colours, edgecolors=colours, linewidths=0.2)
             for tool in _tools(frame):
                 if np.ptp(tool.points, axis=0).max() < 2.0 * (self.high - self.low).max():  # planes hide the body
                     faces = tool.points[tool.polygons]
@@ -110,16 +112,16 @@ class View:
 
     def draw_grid(self, axes: Axes, frame: Snapshot) -> None:
         """Draw the deformed cells over the outline of the initial body, magnified where they hardly move."""
-        displacement, mesh = frame.field("displacement"), frame.mesh
+        displacement, mesh, present = frame.field("displacement"), frame.mesh, frame.present_mesh
         scale = magnification(np.linalg.norm(displacement, axis=1).max(), np.ptp(mesh.nodes, axis=0).max())
         position = mesh.nodes + scale * displacement
         if len(self.low) == 3:
-            _solid(axes, mesh, position, facecolors="#e8e8e8", edgecolors=DARK, linewidths=0.3)
+            _solid(axes, present, position, facecolors="#e8e8e8", edgecolors=DARK, linewidths=0.3)
             axes.set_box_aspect(np.ptp(position, axis=0))
             axes.set(**{f"{k}lim": (x.min(), x.max()) for k, x in zip("xyz", position.T, strict=True)})
         else:
             ring = mesh.kind.drawn
-            around = position[mesh.cells[:, (*ring, ring[0])]]
+            around = position[present.cells[:, (*ring, ring[0])]]
             cut = np.full((len(around), 1, 2), np.nan)
             axes.plot(*np.concatenate([around, cut], axis=1).reshape(-1, 2).T, color=DARK, linewidth=0.4)
             edges = np.concatenate([mesh.nodes[mesh.faces], np.full((len(mesh.faces), 1, 2), np.nan)], axis=1)
