@@ -39,7 +39,7 @@ def memory_of(folder, steps, interval, scheme="cells"):
     command = [sys.executable, "-m", "warpsph", "run", folder / "plate.py", *options]
     subprocess.run(command, check=True, timeout=3000, env=os.environ | {"MALLOC_ARENA_MAX": "2"})
     columns, _ = read_history(folder / "out" / "history.csv")
-    assert columns["step"][-1] == steps
+    assert columns["step"][-1] >= steps  # more where the time step follows what is stretched
     return columns["memory"]
 
 
