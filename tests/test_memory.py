@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warpsph.simulation.history import read_history
+from warpsph.state.energy import COLUMNS
 
 # Its probe is the resident memory of the process [MB].
 SCENE = '''"""Plate that swings for {steps} steps."""
@@ -39,7 +40,7 @@ def memory_of(folder, steps, interval, scheme="cells"):
     command = [sys.executable, "-m", "warpsph", "run", folder / "plate.py", *options]
     subprocess.run(command, check=True, timeout=3000, env=os.environ | {"MALLOC_ARENA_MAX": "2"})
     columns, _ = read_history(folder / "out" / "history.csv")
-    assert columns["step"][-1] == steps
+    assert columns["step"][-1] >= steps  # more where the time step follows what is stretched
     return columns["memory"]
 
 
@@ -61,7 +62,8 @@ def test_memory_does_not_grow_with_the_number_of_steps(steps, scheme, tmp_path):
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="it reads /proc")
 def test_a_sample_takes_its_numbers_and_no_more(tmp_path):
-    """Three numbers a sample, and as much again while their list grows or a checkpoint is written."""
+    """Eight bytes a number, and as much again while their list grows or a checkpoint is written."""
     found = memory_of(tmp_path, 100_000, interval=0.0)
     per_row = 1e6 * np.diff(found[10_000:]).sum() / 90_000
-    assert len(found) == 100_001 and per_row < 100.0, per_row
+    numbers = len(("step", "time", "memory", *COLUMNS))
+    assert len(found) == 100_001 and per_row < 2 * 8 * numbers, per_row

@@ -122,7 +122,9 @@ def test_sweep_survives_its_members_and_tells_all_of_them_in_one_table(bar, tmp_
     }
     assert "AssertionError" in found["raise"]["message"] and "no judge" in found["raise"]["message"]
     assert "spacing = 0.3" in found["scene"]["message"] and "non-finite in step" in found["nan"]["message"]
-    assert "ended by signal 9" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "ended by signal 9" in said.out
+    assert re.fullmatch(r"warpsph: \d of \d runs failed to run; fault=.*: .*\n", said.err), said.err
     assert all(row["velocity"] == "2" for row in rows.values())
     good = found["none"]
     assert float(good["end [m]"]) == pytest.approx(0.02, rel=1e-3) and good["end passed"] == "True"

@@ -25,6 +25,7 @@ from .queue import make_missing
 from .run_folder import HISTORY, SUMMARY
 from .stopping import interrupting
 
+FAILED = "failed to run"  # the status of a member that has no summary of its own
 METRICS = ("nodes", "steps", "simulated_time", "wall_time", "node_steps_per_second")
 
 
@@ -51,9 +52,9 @@ def row(member: Member, folder: Path, error: BaseException | None = None) -> dic
     try:
         if error is None and member.done(folder):
             return found | _outcome(folder)
-        return found | {"status": "failed to run", "message": str(error) if error else last_line(folder)}
+        return found | {"status": FAILED, "message": str(error) if error else last_line(folder)}
     except SceneError as unreadable:
-        return found | {"status": "failed to run", "message": str(unreadable)}
+        return found | {"status": FAILED, "message": str(unreadable)}
 
 
 def _outcome(folder: Path) -> dict[str, object]:

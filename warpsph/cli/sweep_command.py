@@ -17,7 +17,7 @@ from ..validate import index
 from .catalogue import load
 from .settings import MOST_THREADS, count
 from .stopping import status_of
-from .sweep import members, sweep, table
+from .sweep import FAILED, members, sweep, table
 
 
 def add_parser(commands) -> None:
@@ -65,6 +65,10 @@ def _sweep(options: argparse.Namespace) -> int:
     passed = all(found["status"] in ("passed", "no checks") for found in rows)
     if not (options.quiet and passed):
         print(table(rows))
+    lost = [found for found in rows if found["status"] == FAILED]
+    if lost:
+        first = f"{lost[0]['run']}: {lost[0]['message']}"
+        print(f"warpsph: {len(lost)} of {len(rows)} runs failed to run; {first}", file=sys.stderr)
     if not options.quiet:
         print(f"results in {folder / 'sweep.csv'}")
     return 0 if passed else 1
