@@ -22,7 +22,6 @@ from warpsph import (
 )
 
 HEIGHT, GRAVITY, RUN_OUT = 2.0, 9.81, 4.23  # [m], [m/s²], [m]
-SHORT = ("duration=0.3",)
 CLAY = PerzynaVonMises(
     young_modulus=1e6, poisson_ratio=0.45, density=1800.0, fluidity=100.0, yield_size=3.0**0.5 * 2993.0
 )

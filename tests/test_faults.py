@@ -195,7 +195,7 @@ def test_history_that_can_not_begin_leaves_the_former_one(tmp_path):
     path = tmp_path / "history.csv"
     record = History(Simulation(bar(), device="cpu"), path)
     record.close()
-    before, more = path.read_bytes(), {"rows": np.zeros((1000, 3)), "next": np.array(0.0)}
+    before, more = path.read_bytes(), {"rows": np.zeros((1000, len(record.names))), "next": np.array(0.0)}
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limit[1]))
