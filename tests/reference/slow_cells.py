@@ -13,7 +13,9 @@ from tests.reference.slow_step import De, components, full, in_space
 ENDS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])  # of each corner, along the quad's axes
 ALTERNATING = np.array([1.0, -1.0, -1.0, 1.0])
 ROUND = {3: [0, 1, 2], 4: [0, 2, 3, 1]}  # the corners in the order in which one walks around the cell
-CORNER_SHARE = 2.0 / 3.0
+CORNER_SHARE = BENT_SHARE = 2.0 / 3.0
+FLOWING_SHARE = 0.04
+ROUGH = 1.0
 LEAST_VOLUME = 0.15
 CALMING = 0.9
 BENT = 0.5
@@ -53,9 +55,21 @@ def corner_gradients(corners, share):
     return g
 
 
+def bend(corners):
+    """b² of a cell, by the part that its hourglass mode has of its axes."""
+    if len(corners) == 3:
+        return 0.0
+    return np.sum((np.linalg.inv(corners.T @ ENDS / 4.0) @ (ALTERNATING @ corners / 4.0)) ** 2)
+
+
 # ---------------------------------------------------------------------------------------------------------
 # The law: rotation and flow by its own solution
 # ---------------------------------------------------------------------------------------------------------
+
+
+def von_mises(sigma):
+    deviator = sigma - np.trace(sigma) / 3.0 * np.eye(3)
+    return np.sqrt(1.5 * np.sum(deviator**2))
 
 
 def yield_size(eps, model):
@@ -74,7 +88,7 @@ def relax(sigma, eps, time, model):
     """Flow alone at the mean Y of the time; the strain from so many iterations of its implicit equation."""
     Y = yield_size(eps, model)
     deviator = sigma - np.trace(sigma) / 3.0 * np.eye(3)
-    q = np.sqrt(1.5 * np.sum(deviator**2))
+    q = von_mises(sigma)
     if q <= Y:
         return sigma, eps
     three_g = 3.0 * model["E"] / (2.0 * (1.0 + model["nu"]))
@@ -124,12 +138,10 @@ def volumes(x, model):
 
 
 def share_of(cell, x, flowed):
-    """κ of a cell: where a corner has just flowed none, or what holds a cell that is bent already."""
-    lately, bent = max(flowed[i] for i in cell), 0.0
-    if len(cell) == 4:
-        frame = np.linalg.inv(x[cell].T @ ENDS / 4.0)
-        bent = np.abs(frame @ (ALTERNATING @ x[cell] / 4.0)).max() / BENT
-    return CORNER_SHARE * (1.0 - lately + lately * min(bent**2, 1.0))
+    """κ of a cell: where a corner has just flowed little, and what holds a cell that is bent already."""
+    lately, bent = max(flowed[i] for i in cell), min(bend(x[cell]) / BENT**2, 1.0)
+    straight = CORNER_SHARE * (1.0 - lately) + FLOWING_SHARE * lately
+    return (1.0 - bent) * straight + bent * BENT_SHARE
 
 
 def nodal_gradients(x, v, flowed, model):
@@ -145,8 +157,21 @@ def nodal_gradients(x, v, flowed, model):
     return L / volume[:, None, None]
 
 
-def forces(x, x_half, v_half, sigma, L, flowed, dt, model):
-    """f_k = −sum_p w_p (σ_p g_pk(κ) + τ_p g_pk(1)), τ_p = η D_e : (G_p(1) v − L_p) of the half step."""
+def bounded(taus, most, model):
+    """τ_p of corners; their mean, and what alternates along each axis, no larger than the most."""
+    signs = [np.ones(len(taus)), *(ENDS.T if len(taus) == 4 else ())]
+    parts = [np.tensordot(s, taus, axes=1) / len(taus) for s in signs]
+    share = model["nu"] / (1.0 + model["nu"])
+    sizes = [np.sqrt(np.sum(part**2) - share * np.trace(part) ** 2) for part in parts]
+    parts = [part * min(1.0, most / size) if size > 0.0 else part for part, size in zip(parts, sizes, strict=True)]
+    return sum(np.multiply.outer(s, part) for s, part in zip(signs, parts, strict=True))
+
+
+def forces(x, x_half, v_half, sigma, L, flowed, flows, dt, model):
+    """f_k = −sum_p w_p (σ_p g_pk(κ) + τ_p g_pk(1)), τ_p = η D_e : (G_p(1) v − L_p) of the half step.
+
+    `flowed` was before the step's flow, `flows` is after it.
+    """
     f = np.zeros_like(x)
     for cell in model["cells"]:
         n = len(cell)
@@ -154,7 +179,7 @@ def forces(x, x_half, v_half, sigma, L, flowed, dt, model):
         smooth, whole = (corner_gradients(x[cell], share) for share in (share_of(cell, x_half, flowed), 1.0))
         before = corner_gradients(x_half[cell], 1.0)
         speed2 = model["wave_speed"] ** 2 * area / area0  # the mass stays, and so does the stiffness
-        frequency2 = n * speed2 * np.sum(slopes**2) / area**2
+        frequency2 = n * speed2 * np.sum(slopes**2) / area**2 * (1.0 + bend(x[cell]))
         eta = min(0.5 * dt, 1.0 / (dt * frequency2))
         rates = [elastic(L[i], model) for i in cell]
         if n == 4:  # what alternates along both axes is no part of a gradient
@@ -162,9 +187,13 @@ def forces(x, x_half, v_half, sigma, L, flowed, dt, model):
             rates = [rate - s * alternating for s, rate in zip(ALTERNATING, rates, strict=True)]
         else:  # a triangle has one gradient
             rates = [sum(rates) / n] * n
+        G = [sum(np.outer(v_half[j], before[p, k]) for k, j in enumerate(cell)) for p in range(n)]
+        taus = np.array([eta * (elastic(G[p], model) - rates[p]) for p in range(n)])
+        if (lately := max(flows[i] for i in cell)) > 0.0:
+            q = von_mises(sum(full(sigma[i]) for i in cell) / n)
+            taus = bounded(taus, ROUGH * q / lately, model)
         for p, i in enumerate(cell):
-            G = sum(np.outer(v_half[j], before[p, k]) for k, j in enumerate(cell))
-            tau = eta * (elastic(G, model) - rates[p])
+            tau = taus[p]
             for k, j in enumerate(cell):
                 f[j] -= area / n * (full(sigma[i])[:2, :2] @ smooth[p, k] + tau[:2, :2] @ whole[p, k])
     return f
@@ -189,7 +218,7 @@ def slow_cells_step(state: dict, model: dict, t: float, dt: float) -> dict:
             flows[i] = 1.0
         sigma[i] = components(stress)
     x = x + dt * v_half if moves else x
-    f = forces(x, x_half, v_half, sigma, L, flowed, dt, model)
+    f = forces(x, x_half, v_half, sigma, L, flowed, flows, dt, model)
     a = f / model["mass"][:, None] + np.asarray(model["body_force"](t + dt), dtype=float)
     v = held(damped * v_half + h * a, t + dt, model)
     rho = model["mass"] / volumes(x, model)

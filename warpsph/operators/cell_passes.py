@@ -188,7 +188,7 @@ def force_kernel(space: Space, kind: CellKind, law: Law, sharp: bool):
                 part = space.stress.elastic_rate(Y, material.lame, material.shear, material.young)
                 rough = eta * (real(n) * part - rate_parts[p])
                 if wp.static(law.flows) and flowed > real(0.0):
-                    rough = bounded(rough, most, material)
+                    rough = bounded(rough, real(n) * most, material)  # n times a corner's
                 W[p] = towards * stress_parts[p] + rough
                 power += share * space.stress.complementary(
                     rough, part, material.lame, material.shear, material.young
