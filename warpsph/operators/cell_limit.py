@@ -5,6 +5,7 @@ cells have more by n c_p² κ² (1 + b²) Σ_j |∇N_j|², their hourglass modes
 stiffness and a cell's mass stay what they are: c_p² falls as a cell is pressed, and grows as it is stretched.
 """
 
+from abc import ABC, abstractmethod
 from functools import cache
 
 import warp as wp
@@ -19,36 +20,52 @@ from .cell_passes import BENT, BENT_SHARE
 from .cell_shape import cell_shape
 
 
-class CellLimit:
-    """A `Part`: the rate of the fastest wave across a cell, measured anew when a node has strained by 2 %.
+class Limit(ABC):
+    """A `Part`: the rate of the fastest wave, measured anew when a node has strained by 2 %.
 
     Args:
         body: the body in its initial state.
         clock: gives the flag that says when it is outdated.
+        rates: how many of them there are.
+        kernels: what measures them.
 
     Attributes:
         outdated: the flag.
-        shrinkage: least time of a wave across a cell over the initial one, at most 1.
-        kernels: what measures it.
+        shrinkage: least time of a wave over the initial one, at most 1.
+        kernels: all that it launches.
     """
 
-    def __init__(self, body: CellBody, clock: Clock):
+    def __init__(self, body: CellBody, clock: Clock, *, rates: int, kernels: tuple):
         self._body, self.outdated, self.shrinkage = body, clock.new_flag(), 1.0
-        self._kernel = _rate_kernel(body.space, body.kind)
-        self._rate = wp.zeros(body.corners.shape[0], dtype=body.space.real, device=body.launcher.device)
-        self._largest = LargestMagnitude(len(self._rate), body.space.precision, body.launcher)
+        self._rate = wp.zeros(rates, dtype=body.space.real, device=body.launcher.device)
+        self._largest = LargestMagnitude(rates, body.space.precision, body.launcher)
         self._initial = 0.0  # not measured yet
-        self.kernels = (self._kernel, *self._largest.kernels)
+        self.kernels = (*kernels, *self._largest.kernels)
+
+    @abstractmethod
+    def _measure(self) -> None:
+        """Fill `_rate` in the present configuration, with the present cells."""
 
     def refresh(self) -> None:
-        """Measure it in the present configuration."""
-        body = self._body
-        body.launcher.launch(self._kernel, self._rate, [body.corners, body.cell_mass, body.nodes, self._rate])
+        """Measure it now."""
+        self._measure()
         fastest = self._largest.of(self._rate)
         self._initial = self._initial or fastest
         self.shrinkage = self._initial / max(fastest, self._initial)
-        body.nodes.strained.zero_()
+        self._body.nodes.strained.zero_()
         self.outdated.zero_()
+
+
+class CellLimit(Limit):
+    """The `Limit` of each cell by itself."""
+
+    def __init__(self, body: CellBody, clock: Clock):
+        self._kernel = _rate_kernel(body.space, body.kind)
+        super().__init__(body, clock, rates=body.corners.shape[0], kernels=(self._kernel,))
+
+    def _measure(self) -> None:
+        body = self._body
+        body.launcher.launch(self._kernel, self._rate, [body.corners, body.cell_mass, body.nodes, self._rate])
 
 
 @cache

@@ -11,50 +11,27 @@ from functools import cache
 import warp as wp
 
 from ..device.compiling import forward_kernel
-from ..device.reduction import LargestMagnitude
 from ..mesh.kinds import CellKind
 from ..physics.space import Space
 from ..state.cell_body import CellBody, cell_node_types
 from ..state.cells import NodeCells, corner_place
 from ..state.clock import Clock
+from .cell_limit import Limit
 from .cell_shape import cell_shape
 
 
-class NodeLimit:
-    """A `Part` in the place of `CellLimit`: the same rate, the mean around each node.
-
-    Args:
-        body: the body in its initial state, whose `node_cells` have no slots.
-        clock: gives the flag that says when it is outdated.
-
-    Attributes:
-        outdated: the flag.
-        shrinkage: least time of a wave across the cells around a node over the initial one, at most 1.
-        kernels: what measures it.
-    """
+class NodeLimit(Limit):
+    """The `Limit` of the cells around each node; the body's `node_cells` have no slots."""
 
     def __init__(self, body: CellBody, clock: Clock):
-        self._body, self.outdated, self.shrinkage = body, clock.new_flag(), 1.0
-        kernels = _stiffness_kernel(body.space, body.kind), _rate_kernel(body.space, body.kind)
-        self._stiffen, self._kernel = kernels
-        self._stiffness, self._rate = (
-            wp.zeros(over.shape[0], dtype=body.space.real, device=body.launcher.device)
-            for over in (body.corners, body.nodes.mass)
-        )
-        self._largest = LargestMagnitude(len(self._rate), body.space.precision, body.launcher)
-        self._initial = 0.0  # not measured yet
-        self.kernels = (*kernels, *self._largest.kernels)
+        self._stiffen, self._kernel = _stiffness_kernel(body.space, body.kind), _rate_kernel(body.space, body.kind)
+        self._stiffness = wp.zeros(body.corners.shape[0], dtype=body.space.real, device=body.launcher.device)
+        super().__init__(body, clock, rates=body.nodes.mass.shape[0], kernels=(self._stiffen, self._kernel))
 
-    def refresh(self) -> None:
-        """Measure it in the present configuration, with the present cells."""
+    def _measure(self) -> None:
         body, launch = self._body, self._body.launcher.launch
         launch(self._stiffen, self._stiffness, [body.corners, body.nodes, self._stiffness])
         launch(self._kernel, self._rate, [self._stiffness, body.node_cells, body.nodes, self._rate])
-        fastest = self._largest.of(self._rate)
-        self._initial = self._initial or fastest
-        self.shrinkage = self._initial / max(fastest, self._initial)
-        body.nodes.strained.zero_()
-        self.outdated.zero_()
 
 
 @cache
